@@ -1,0 +1,24 @@
+"""Gymnasium environments of an underwater swimming manipulator, and their scoring."""
+
+from importlib.metadata import version
+
+from usm_gym.dynamics import accelerations
+from usm_gym.metrics import max_error
+from usm_gym.registration import register_environments
+from usm_gym.robot import Robot, Thruster
+from usm_gym.scenario import Conditions, Inspection, Path, Scenario, Water
+
+__all__ = [
+    "Conditions",
+    "Inspection",
+    "Path",
+    "Robot",
+    "Scenario",
+    "Thruster",
+    "Water",
+    "accelerations",
+    "max_error",
+]
+__version__ = version("usm-gym")
+
+register_environments()

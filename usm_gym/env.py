@@ -1,0 +1,250 @@
+"""The Gymnasium environments of one robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.nominal import Nominal, nominal_of
+from usm_gym.observation import ObservationLayout
+from usm_gym.reward import reward, reward_of_loss
+from usm_gym.robot import Robot
+from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named, sample
+from usm_gym.simulation import Simulation, Snapshot
+from usm_gym.validation import require
+
+Observation = NDArray[np.float32]
+
+
+class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
+    """An underwater swimming manipulator whose centre of mass has to follow a path.
+
+    Sixteen links, five thrusters. The thrusters hold the centre of mass on a slow path; in
+    operation mode (`USM-Operation-v0`) the joints meanwhile bend the head side of the body one way,
+    the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
+    (`USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the line of
+    sight. The score of an episode is the largest true position error in each axis after settling.
+
+    ## Action
+
+    `Box(-1, 1, (5,), float32)`: commands of the thrusters over their limit (20 N in "field");
+    values beyond saturate, a wrong shape or a value that is not a number raises `ValueError`.
+
+    | index | thruster | positive force |
+    |---|---|---|
+    | 0 | link 1 (tail), along the link | towards the head |
+    | 1 | link 3, across | to the left of the link |
+    | 2 | link 6, across | to the left |
+    | 3 | link 11, across | to the left |
+    | 4 | link 14 (head side), across | to the left |
+
+    ## Observation
+
+    `Box(float32)` of 90 numbers, the same in both modes: physical value over scale. Every error is
+    actual minus reference. Angles are never wrapped. The true velocity of the centre of mass, the
+    current and the true coefficients are not observed.
+
+    OBSERVATION_TABLE
+
+    ## Reward
+
+    r = -10 mean_axes |e| / (|e| + 0.02 m) - 0.1 mean_thrusters |command| / limit, with the true
+    position error e after the step. The step that loses the robot costs -10.1 for itself and for
+    every step that remains, so that ending early never pays.
+
+    ## Start
+
+    Straight, at rest, on the reference. `reset(seed=...)` draws a scenario of the mode from
+    `env.np_random`. `reset(options={"scenario": s})` takes s = "nominal" or "table1", under the
+    environment's conditions, or a `Scenario` or its dict, which brings its own.
+
+    ## End
+
+    Truncation at the scenario's duration (40 s, 2000 steps). Termination when the robot is lost:
+    the true error exceeds 0.5 m in an axis, or the state is no longer finite; the observation is
+    finite all the same.
+
+    ## Info, at every step
+
+    | key | unit | meaning |
+    |---|---|---|
+    | `error_x`, `error_y` | m | true position error |
+    | `max_error_x`, `max_error_y` | m | its largest absolute value since the settle time; 0 before |
+    | `heading_error` | rad | heading minus its reference, as known on board |
+    | `thrust_effort` | N | mean absolute command of the thrusters |
+    | `diverged` | 0 or 1 | whether the robot is lost |
+
+    ## Arguments
+
+    | argument | default | meaning |
+    |---|---|---|
+    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of fields of `usm_gym.Conditions` on top of "field" |
+    | `robot` | the paper's | a dict of fields of `usm_gym.Robot` |
+
+    ## Version history
+
+    - v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 50}
+
+    def __init__(
+        self,
+        mode: Mode,
+        conditions: str | Mapping[str, Any] | Conditions = "field",
+        robot: Mapping[str, Any] | Robot | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        """Make the environment; no random number is drawn before `reset`.
+
+        Raises:
+            ValueError: If a condition, a field of the robot or the render mode is not allowed.
+        """
+        require(render_mode is None, "render_mode", render_mode, "None")
+        self.mode = mode
+        self.conditions = conditions_of(conditions)
+        self.robot = robot if isinstance(robot, Robot) else Robot(**(robot or {}))
+        self.render_mode = render_mode
+        self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
+        self.observation_space = self.layout.space
+        self.action_space = action_space(self.robot)
+        self._simulation: Simulation | None = None
+
+    @property
+    def nominal(self) -> Nominal:
+        """What a controller may know beforehand."""
+        scenario = named("nominal", self.mode, self.conditions)
+        if self._simulation is not None:
+            scenario = self.scenario
+        return nominal_of(self.robot, scenario)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario in progress."""
+        return self._running.scenarios[0]
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation, of one robot: for drawing and for privileged planners."""
+        return self._running
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode; see the class for `options`.
+
+        Raises:
+            ValueError: If an option or a scenario is unknown or not valid.
+        """
+        super().reset(seed=seed)
+        scenario = scenario_of(options, self.mode, self.conditions, self.robot, self.np_random)
+        self._simulation = Simulation(self.robot, [scenario])
+        return self._simulation.observation[0].copy(), self._info()
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Hold the thruster commands for one control period.
+
+        Raises:
+            ValueError: If the action has the wrong shape or is not finite.
+        """
+        simulation = self._running
+        batch = checked_action(action, self.action_space.shape)[np.newaxis]
+        simulation.step(batch)
+        rewards, terminated, truncated = outcome(simulation)
+        return (
+            simulation.observation[0].copy(),
+            float(rewards[0]),
+            bool(terminated[0]),
+            bool(truncated[0]),
+            self._info(),
+        )
+
+    def snapshot(self) -> Snapshot:
+        """Copy the whole simulation state."""
+        return self._running.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot; equal actions then have equal consequences, to the bit."""
+        self._simulation = Simulation(self.robot, list(snapshot.scenarios))
+        self._simulation.restore(snapshot)
+
+    @property
+    def _running(self) -> Simulation:
+        if self._simulation is None:
+            raise gym.error.ResetNeeded("call reset() before anything else")
+        return self._simulation
+
+    def _info(self) -> dict[str, Any]:
+        return {key: values[0].item() for key, values in infos(self._running).items()}
+
+
+# The class docstring is the specification; its table comes from the one that the code uses.
+USMEnv.__doc__ = (USMEnv.__doc__ or "").replace(
+    "OBSERVATION_TABLE", ObservationLayout(16, 5).table().replace("\n", "\n    ")
+)
+
+
+def action_space(robot: Robot) -> gym.spaces.Box:
+    """The action space of a robot."""
+    return gym.spaces.Box(-1.0, 1.0, (len(robot.thrusters),), np.float32)
+
+
+def checked_action(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """The action as float32, or an error that says what is wrong with it."""
+    array = np.asarray(action, np.float32)
+    require(array.shape == shape, "the action's shape", array.shape, f"{shape}")
+    require(not np.isnan(array).any(), "action", action, "numbers, not NaN")
+    return array
+
+
+def scenario_of(
+    options: Mapping[str, Any] | None,
+    mode: Mode,
+    conditions: Conditions,
+    robot: Robot,
+    stream: np.random.Generator,
+) -> Scenario:
+    """The scenario that reset options ask for; without any, one drawn from the stream."""
+    options = options or {}
+    unknown = sorted(set(options) - {"scenario"})
+    require(not unknown, "options", unknown, "scenario")
+    wanted = options.get("scenario")
+    if wanted is None:
+        return sample(mode, conditions, stream, robot.links - 1)
+    if isinstance(wanted, str):
+        return named(wanted, mode, conditions)
+    scenario = wanted if isinstance(wanted, Scenario) else Scenario.from_dict(wanted)
+    require(scenario.mode == mode, "the scenario's mode", scenario.mode, repr(mode))
+    return scenario
+
+
+def outcome(
+    simulation: Simulation,
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rewards, terminations and truncations of the step just made, (size,) each."""
+    lost = simulation.lost
+    remaining = simulation.steps - simulation.count
+    rewards = reward(simulation.error, simulation.command, simulation.limit)
+    if lost.any():
+        rewards[lost] = reward_of_loss(remaining[lost])
+    return rewards, lost, (remaining <= 0) & ~lost
+
+
+def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
+    """The info of every robot: arrays of shape (size,)."""
+    error, largest = np.nan_to_num(simulation.error), np.nan_to_num(simulation.max_error)
+    return {
+        "error_x": error[:, 0],
+        "error_y": error[:, 1],
+        "max_error_x": largest[:, 0],
+        "max_error_y": largest[:, 1],
+        "heading_error": np.nan_to_num(simulation.heading_error),
+        "thrust_effort": np.abs(simulation.command).mean(axis=1),
+        "diverged": simulation.lost.astype(np.int64),
+    }

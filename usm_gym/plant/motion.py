@@ -1,0 +1,65 @@
+"""What the robot is asked to do: the path of the centre of mass, joint references, the heading."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from usm_gym.plant.compile import compiled, piece
+from usm_gym.plant.elementary import arctan, exp_of_negative, sincos
+
+
+@piece
+def path(t, speed, sway, frequency, ramp):
+    """The reference (p_x, p_y, v_x, v_y, a_x, a_y) at time t: p = (v s, A sin(w s)), s = s(t).
+
+    Path time s starts from rest: s = t^2 / (2 ramp) up to t = ramp, then t - ramp / 2.
+    """
+    s, s_dot, s_ddot = t - 0.5 * ramp, 1.0, 0.0
+    if t < ramp:
+        s, s_dot, s_ddot = 0.5 * t * t / ramp, t / ramp, 1.0 / ramp
+    sine, cosine = sincos(frequency * s)
+    slope = sway * frequency
+    return (
+        speed * s,
+        sway * sine,
+        speed * s_dot,
+        slope * cosine * s_dot,
+        speed * s_ddot,
+        slope * (cosine * s_ddot - frequency * sine * (s_dot * s_dot)),
+    )
+
+
+@compiled
+def filter_coefficients(frequency, step):
+    """The critically damped filter x'' = w^2 (target - x) - 2 w x' over one physics step, exactly.
+
+    Returns:
+        (x from x, x from x', x' from x, x' from x', w^2, 2 w), x measured from the target; all
+        zero for an infinite frequency: the reference then is the target itself.
+    """
+    if frequency == np.inf:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    wh = frequency * step
+    decay = exp_of_negative(-wh)
+    return (
+        decay * (1.0 + wh),
+        decay * step,
+        -decay * frequency * wh,
+        decay * (1.0 - wh),
+        frequency * frequency,
+        2.0 * frequency,
+    )
+
+
+@compiled
+def lag_share(time_constant, step):
+    """Share of the way to its command that a thruster covers in one physics step, 1 - e^(-h/tau)."""
+    if time_constant == 0.0:
+        return 1.0
+    return 1.0 - exp_of_negative(-step / time_constant)
+
+
+@piece
+def line_of_sight(distance, look_ahead):
+    """Heading reference psi_ref = -atan(distance / look_ahead), rad (section 5.1.1); 0 without one."""
+    return -arctan(distance / look_ahead) if look_ahead > 0.0 else 0.0

@@ -1,0 +1,224 @@
+"""One control period of the plant: command, then all physics steps, for blocks of robots.
+
+Every quantity is a float64 or a `Lanes`, as in `chain`. `implicit` is the physics step h for
+symplectic Euler with implicit drag and joints, and 0 for explicit Euler.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.plant.chain import Body, accelerate
+from usm_gym.plant.compile import compiled, piece
+from usm_gym.plant.elementary import sincos
+from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
+from usm_gym.plant.layout import *  # noqa: F403  (the row names)
+from usm_gym.plant.measure import Table, command, measure
+
+
+class Plant(NamedTuple):
+    """What all robots of a fleet share.
+
+    Attributes:
+        body: Their links.
+        links: Number of links.
+        thruster_links: Zero-based link of each thruster, int64.
+        thruster_is_normal: Whether each thruster pushes across its link.
+        h: Physics step, s.
+        substeps: Physics steps in a control period.
+        shifts: Largest number of changes of the joint references in any episode.
+        moving_water: Whether the water's velocity changes in any episode.
+    """
+
+    body: Body
+    links: int
+    thruster_links: NDArray[np.int64]
+    thruster_is_normal: NDArray[np.bool_]
+    h: float
+    substeps: int
+    shifts: int
+    moving_water: bool
+
+
+class Fleet(NamedTuple):
+    """The robots simulated side by side, `size` of them in blocks of `lanes`.
+
+    Attributes:
+        blocks: All their numbers, see `layout`, shape (blocks, rows * lanes).
+        count: Control periods since the start, int64, (size,).
+        noise: Measurement errors of the position, m, (size, control instants, 2).
+        error: True position errors, m, (size, 2).
+        heading_error: Heading errors as known on board, rad, (size,).
+        observation: Observations, float32, (size, numbers).
+    """
+
+    blocks: NDArray[np.float64]
+    count: NDArray[np.int64]
+    noise: NDArray[np.float64]
+    error: NDArray[np.float64]
+    heading_error: NDArray[np.float64]
+    observation: NDArray[np.float32]
+
+
+@piece
+def advance_references(block, like, shifts, h):
+    """Move the joint references on by one physics step, towards the deflection now asked for."""
+    t = load(block, CLOCK, like) * h
+    target = like
+    for k in range(shifts):
+        reached = t >= load(block, SHIFT_TIME + k, like)
+        target += where(reached, load(block, SHIFT_SIZE + k, like), like)
+    x = load(block, DEFLECTION, like) - target
+    rate = load(block, DEFLECTION_RATE, like)
+    moved = load(block, FILTER_DD, like) * x + load(block, FILTER_DR, like) * rate
+    turned = load(block, FILTER_RD, like) * x + load(block, FILTER_RR, like) * rate
+    store(block, DEFLECTION, target + moved)
+    store(block, DEFLECTION_RATE, turned)
+    pull = load(block, FILTER_STIFFNESS, like) * moved + load(block, FILTER_DAMPING, like) * turned
+    store(block, DEFLECTION_ACCELERATION, -pull)
+
+
+@piece
+def move_water(block, like, h):
+    """Velocity and acceleration of the water now."""
+    frequency = load(block, WATER_FREQUENCY, like)
+    angle = frequency * (load(block, CLOCK, like) * h)
+    s, c = sincos(angle + load(block, PHASE_X, like))
+    amplitude = load(block, AMPLITUDE_X, like)
+    store(block, WATER_X, load(block, MEAN_X, like) + amplitude * s)
+    store(block, WATER_AX, amplitude * (frequency * c))
+    s, c = sincos(angle + load(block, PHASE_Y, like))
+    amplitude = load(block, AMPLITUDE_Y, like)
+    store(block, WATER_Y, load(block, MEAN_Y, like) + amplitude * s)
+    store(block, WATER_AY, amplitude * (frequency * c))
+
+
+@piece
+def push(block, like, plant):
+    """First-order lag of every thruster, and its force on its link."""
+    for j in range(plant.thruster_links.size):
+        record = HEADER + plant.thruster_links[j] * RECORD
+        store(block, record + PUSH_T, like)
+        store(block, record + PUSH_N, like)
+    lag = load(block, LAG, like)
+    for j in range(plant.thruster_links.size):
+        thruster = HEADER + plant.links * RECORD + j * THRUSTER
+        force = load(block, thruster + FORCE, like)
+        force += lag * (load(block, thruster + COMMAND, like) - force)
+        store(block, thruster + FORCE, force)
+        direction = PUSH_N if plant.thruster_is_normal[j] else PUSH_T
+        target = HEADER + plant.thruster_links[j] * RECORD + direction
+        store(block, target, load(block, target, like) + force)
+
+
+@piece
+def joint_torques(block, like, links, implicit):
+    """Torque of every joint controller, less the part that is in the joint-space inertia.
+
+    u = k_p (phi_ref - phi - h phi') + k_d (phi_ref' - phi') - (h k_d + h^2 k_p) phi''.
+    """
+    bending = load(block, BENDING_JOINTS, like)
+    k_p = load(block, STIFFNESS, like)
+    k_d = load(block, DAMPING, like)
+    share = 1.0 / bending
+    target = k_p * (share * load(block, DEFLECTION, like)) + k_d * (
+        share * load(block, DEFLECTION_RATE, like)
+    )
+    damping = k_d + implicit * k_p
+    theta = load(block, HEADER + THETA, like)
+    omega = load(block, HEADER + OMEGA, like)
+    for i in range(links - 1):
+        record = HEADER + i * RECORD
+        theta_next = load(block, record + RECORD + THETA, like)
+        omega_next = load(block, record + RECORD + OMEGA, like)
+        wanted = where(i + bending >= links - 1.0, target, like)
+        torque = wanted - k_p * (theta - theta_next) - damping * (omega - omega_next)
+        store(block, record + TORQUE, torque)
+        theta, omega = theta_next, omega_next
+
+
+@piece
+def integrate(block, like, links, h, implicit):
+    """Positions from the new velocities, or from the old ones where `implicit` is 0."""
+    symplectic = implicit > 0.0
+    for i in range(links):
+        record = HEADER + i * RECORD
+        old = load(block, record + OMEGA, like)
+        new = old + h * load(block, record + ALPHA, like)
+        rate = new if symplectic else old
+        store(block, record + OMEGA, new)
+        store(block, record + THETA, load(block, record + THETA, like) + h * rate)
+    for axis in range(2):
+        old = load(block, V_X + axis, like)
+        new = old + h * load(block, A_X + axis, like)
+        rate = new if symplectic else old
+        store(block, V_X + axis, new)
+        store(block, P_X + axis, load(block, P_X + axis, like) + h * rate)
+    store(block, CLOCK, load(block, CLOCK, like) + 1.0)
+
+
+@piece
+def advance(block, like, plant):
+    """Advance one block by a control period."""
+    h, implicit = plant.h, plant.body.h
+    for _ in range(plant.substeps):
+        if implicit > 0.0:
+            advance_references(block, like, plant.shifts, h)
+        if plant.moving_water:
+            move_water(block, like, h)
+        push(block, like, plant)
+        joint_torques(block, like, plant.links, implicit)
+        accelerate(block, like, plant.links, plant.body)
+        integrate(block, like, plant.links, h, implicit)
+        if implicit == 0.0:
+            advance_references(block, like, plant.shifts, h)
+
+
+@piece
+def run(fleet, plant, table, actions, like, lanes, first, last):
+    """One control period of blocks `first` to `last`: command, advance, measure."""
+    size = actions.shape[0]
+    for k in range(first, last):
+        for robot in range(k * lanes, min((k + 1) * lanes, size)):
+            command(fleet.blocks[k], lanes, robot - k * lanes, plant.links, actions[robot])
+        advance(block_at(fleet.blocks, k), like, plant)
+        for robot in range(k * lanes, min((k + 1) * lanes, size)):
+            fleet.count[robot] += 1
+            observe(fleet, plant, table, robot, lanes)
+
+
+@piece
+def observe(fleet, plant, table, robot, lanes):
+    """Measure one robot."""
+    fleet.heading_error[robot] = measure(
+        fleet.blocks[robot // lanes],
+        lanes,
+        robot % lanes,
+        plant.links,
+        plant.h,
+        fleet.noise[robot, fleet.count[robot]],
+        table,
+        fleet.error[robot],
+        fleet.observation[robot],
+    )
+
+
+@compiled
+def observe_one(fleet, plant, table, robot, lanes):
+    """Measure one robot outside a control period: at the start of its episode."""
+    observe(fleet, plant, table, robot, lanes)
+
+
+@compiled
+def run_singles(fleet, plant, table, actions, first, last):
+    """`run` for blocks of one robot each."""
+    run(fleet, plant, table, actions, 0.0, 1, first, last)
+
+
+@compiled
+def run_lanes(fleet, plant, table, actions, first, last):
+    """`run` for blocks of `lanes.WIDTH` robots each."""
+    run(fleet, plant, table, actions, spread(0.0), WIDTH, first, last)

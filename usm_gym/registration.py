@@ -1,0 +1,17 @@
+"""The environments' entries in Gymnasium's registry."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+
+from usm_gym.scenario import MODES
+
+
+def register_environments() -> None:
+    """Register `USM-Operation-v0` and `USM-Torpedo-v0`; they truncate episodes themselves."""
+    for mode in MODES:
+        gym.register(
+            id=f"USM-{mode.capitalize()}-v0",
+            entry_point="usm_gym.env:USMEnv",
+            kwargs={"mode": mode},
+        )

@@ -1,0 +1,195 @@
+"""The robot: a chain of equal links with thrusters, and the coefficients that follow from it."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic.dataclasses import dataclass
+
+from usm_gym.validation import CONFIG, Count, NonNegative, Positive, require
+
+Direction = Literal["axial", "normal"]
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Thruster:
+    """A thruster at the centre of a link, pushing along the link or across it.
+
+    Attributes:
+        link: Number of the link that carries it, 1 = tail.
+        direction: "axial" pushes along the link's tangent (towards the head for a positive
+            force), "normal" along its normal, a quarter turn anticlockwise from the tangent.
+    """
+
+    link: Count
+    direction: Direction
+
+
+PAPER_THRUSTERS = (
+    Thruster(1, "axial"),
+    Thruster(3, "normal"),
+    Thruster(6, "normal"),
+    Thruster(11, "normal"),
+    Thruster(14, "normal"),
+)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Robot:
+    """An underwater swimming manipulator: `links` equal links, joined end to end in a plane.
+
+    The defaults are the paper's robot (section 5.1). The hydrodynamic coefficients are
+    properties, computed here and nowhere else with the formulas of Kelasidi et al. (ICRA 2014).
+    That source uses `tangential_drag` and `normal_drag` for the linear and for the quadratic
+    term alike, which implies a reference speed of 1 m/s, and prints units for `added_inertia`
+    and `linear_yaw_drag` that do not match their formulas; the published values are kept.
+
+    Attributes:
+        links: Number of links, 2 or more.
+        link_length: Length of one link, 2l, m.
+        link_mass: Mass of one link, kg; the default makes it neutrally buoyant.
+        half_height: Semi-axis a of the elliptic section, m; added mass across the link grows with its square.
+        half_width: Semi-axis b of the elliptic section, m.
+        water_density: Density of the water, kg/m^3.
+        friction_coefficient: C_f, skin friction, dimensionless.
+        drag_coefficient: C_D, cross-flow drag, dimensionless.
+        added_mass_coefficient: C_A, dimensionless.
+        added_inertia_coefficient: C_M, dimensionless.
+        joint_stiffness: Proportional gain of the joint controllers, N m/rad.
+        joint_damping: Derivative gain of the joint controllers, N m s/rad.
+        thrusters: The thrusters in the order of every thruster vector.
+    """
+
+    links: Count = 16
+    link_length: Positive = 0.14
+    link_mass: Positive = 0.6597
+    half_height: Positive = 0.03
+    half_width: Positive = 0.05
+    water_density: Positive = 1000.0
+    friction_coefficient: NonNegative = 0.03
+    drag_coefficient: NonNegative = 2.0
+    added_mass_coefficient: NonNegative = 1.0
+    added_inertia_coefficient: NonNegative = 1.0
+    joint_stiffness: NonNegative = 20.0
+    joint_damping: NonNegative = 5.0
+    thrusters: tuple[Thruster, ...] = PAPER_THRUSTERS
+
+    def __post_init__(self) -> None:
+        """Refuse a single link and a layout that leaves a planar wrench out of reach."""
+        require(self.links >= 2, "links", self.links, "2 or more")
+        for thruster in self.thrusters:
+            require(
+                thruster.link <= self.links, "thrusters", thruster, f"links 1 to {self.links}"
+            )
+        require(
+            np.linalg.matrix_rank(self._straight_allocation()) == 3,
+            "thrusters",
+            self.thrusters,
+            "a layout whose forces span surge, sway and yaw of the straight body",
+        )
+
+    @property
+    def half_length(self) -> float:
+        """Half the length of a link, l, m."""
+        return self.link_length / 2
+
+    @property
+    def link_inertia(self) -> float:
+        """Moment of inertia of a link about its centre, J = m l^2 / 3, kg m^2."""
+        return self.link_mass * self.half_length**2 / 3
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the robot, m_t, kg."""
+        return self.links * self.link_mass
+
+    @property
+    def tangential_drag(self) -> float:
+        """c_t, N s/m (linear term) and N s^2/m^2 (quadratic term)."""
+        mean_radius = (self.half_height + self.half_width) / 2
+        return (
+            0.5
+            * self.water_density
+            * math.pi
+            * self.friction_coefficient
+            * mean_radius
+            * self.link_length
+        )
+
+    @property
+    def normal_drag(self) -> float:
+        """c_n, N s/m (linear term) and N s^2/m^2 (quadratic term)."""
+        return (
+            0.5
+            * self.water_density
+            * self.drag_coefficient
+            * 2
+            * self.half_height
+            * self.link_length
+        )
+
+    @property
+    def added_mass(self) -> float:
+        """Added mass of a link across its axis, mu_n, kg; there is none along it."""
+        return (
+            self.water_density
+            * math.pi
+            * self.added_mass_coefficient
+            * self.half_height**2
+            * self.link_length
+        )
+
+    @property
+    def added_inertia(self) -> float:
+        """Added moment of inertia of a link, lambda_1."""
+        a, b, l = self.half_height, self.half_width, self.half_length
+        return (
+            self.water_density
+            * math.pi
+            * self.added_inertia_coefficient
+            * (a**2 - b**2) ** 2
+            * l**3
+            / 12
+        )
+
+    @property
+    def linear_yaw_drag(self) -> float:
+        """Linear yaw drag of a link, lambda_2."""
+        a, b, l = self.half_height, self.half_width, self.half_length
+        return self.water_density * math.pi * self.friction_coefficient * (a + b) * l**3 / 6
+
+    @property
+    def quadratic_yaw_drag(self) -> float:
+        """Quadratic yaw drag of a link, lambda_3."""
+        a, b, l = self.half_height, self.half_width, self.half_length
+        return self.water_density * math.pi * self.friction_coefficient * (a + b) * l**4 / 8
+
+    @property
+    def hydrodynamic_coefficients(self) -> tuple[float, float, float, float, float, float]:
+        """(c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the six that are uncertain in practice."""
+        return (
+            self.tangential_drag,
+            self.normal_drag,
+            self.added_mass,
+            self.added_inertia,
+            self.linear_yaw_drag,
+            self.quadratic_yaw_drag,
+        )
+
+    @property
+    def thruster_links(self) -> NDArray[np.int64]:
+        """Zero-based link index of each thruster, int64, shape (thrusters,)."""
+        return np.array([thruster.link - 1 for thruster in self.thrusters], dtype=np.int64)
+
+    @property
+    def thruster_is_normal(self) -> NDArray[np.bool_]:
+        """Whether each thruster pushes across its link, bool, shape (thrusters,)."""
+        return np.array([thruster.direction == "normal" for thruster in self.thrusters])
+
+    def _straight_allocation(self) -> NDArray[np.float64]:
+        normal = self.thruster_is_normal
+        position = 2 * self.thruster_links - (self.links - 1)
+        return np.stack([~normal, normal, normal * position]).astype(np.float64)

@@ -1,0 +1,375 @@
+"""What happens in an episode: path, joint motion, conditions, water; presets, sampling and JSON.
+
+All of it is plain data. A `Scenario` fixes an episode completely, sensor noise included, and is the
+same in JSON (`to_dict`, `from_dict`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, Literal, get_args
+
+import numpy as np
+from pydantic import Field, TypeAdapter
+from pydantic.dataclasses import dataclass
+
+from usm_gym.validation import CONFIG, Count, NonNegative, Number, Positive, Switch, require
+
+Mode = Literal["operation", "torpedo"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+Range = tuple[Number, Number]
+
+# Spawn keys of the streams that a noise seed opens.
+NOISE, WATER = range(2)
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Path:
+    """The path of the centre of mass, p_ref = (speed s, amplitude sin(frequency s)).
+
+    Attributes:
+        speed: v, m/s.
+        amplitude: A, m.
+        frequency: Angular frequency, rad/s.
+        ramp: Time over which path time s starts from rest, s; 0 starts at full speed.
+    """
+
+    speed: Number = 0.042
+    amplitude: Number = 0.18
+    frequency: Number = 0.065
+    ramp: NonNegative = 2.0
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Inspection:
+    """The joint motion: the head side of the body bends one way, the other way, and back.
+
+    A head deflection d is the reference d / bending_joints on each of the last joints, and turns the
+    head to -d.
+
+    Attributes:
+        bending_joints: How many joints bend, counted from the head.
+        times: When the deflection changes, s, rising.
+        deflections: To what it changes at those times, rad.
+        filter_frequency: Natural frequency of the critically damped second-order filter between
+            those steps and the joint references, rad/s; None leaves them steps.
+    """
+
+    bending_joints: Count = 11
+    times: tuple[NonNegative, ...] = (10.0, 20.0, 30.0)
+    deflections: tuple[Number, ...] = (0.98, -0.98, 0.0)
+    filter_frequency: Positive | None = 8.0
+
+    def __post_init__(self) -> None:
+        """Refuse times that do not rise or do not match the deflections."""
+        require(
+            len(self.times) == len(self.deflections) <= 8,
+            "deflections",
+            self.deflections,
+            "as many as times, 8 at most",
+        )
+        rising = all(a < b for a, b in zip(self.times, self.times[1:], strict=False))
+        require(rising, "times", self.times, "rising times")
+
+
+STILL = Inspection(bending_joints=1, times=(), deflections=())
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Conditions:
+    """Sensors, actuators, timing, and the ranges from which water and joint motion are drawn.
+
+    The defaults are the preset "field".
+
+    Attributes:
+        control_period: Time between two actions, s; a multiple of the physics step.
+        physics_step: Step of the integration, s.
+        integrator: "symplectic" treats drag and joint controllers implicitly; "explicit" is Euler's
+            forward method, stable with the default joint gains only below about 1e-4 s.
+        hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
+        thruster_time_constant: First-order lag of the thrusters, s; 0 for none.
+        thruster_limit: Largest force of a thruster, N.
+        position_noise: Standard deviation of the position measurement in each axis, m.
+        current_limit: Largest constant current in each axis, m/s.
+        current_variation: Largest amplitude of a sinusoidal current on top of it, m/s.
+        coefficient_range: True hydrodynamic coefficients over the nominal ones.
+        deflection_range: Size of the head deflections, rad.
+        filter_range: Natural frequency of the joint references' filter, rad/s.
+        motion: False keeps the joints still.
+    """
+
+    control_period: Positive = 0.02
+    physics_step: Positive = 1e-3
+    integrator: Literal["symplectic", "explicit"] = "symplectic"
+    hydrodynamics: Literal["consistent", "kelasidi2014"] = "consistent"
+    thruster_time_constant: NonNegative = 0.05
+    thruster_limit: Positive = 20.0
+    position_noise: NonNegative = 5e-5
+    current_limit: NonNegative = 0.05
+    current_variation: NonNegative = 0.0
+    coefficient_range: Range = (0.8, 1.2)
+    deflection_range: Range = (0.7, 1.75)
+    filter_range: Range = (6.0, 12.0)
+    motion: Switch = True
+
+    def __post_init__(self) -> None:
+        """Refuse a control period that is no multiple of the step, and ranges that are none."""
+        multiple = self.control_period / self.physics_step
+        require(
+            round(multiple) >= 1 and math.isclose(multiple, round(multiple), rel_tol=1e-9),
+            "control_period",
+            self.control_period,
+            f"a multiple of physics_step = {self.physics_step}",
+        )
+        for name in ("coefficient_range", "deflection_range", "filter_range"):
+            low, high = getattr(self, name)
+            require(0 < low <= high, name, (low, high), "0 < low <= high")
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in a control period."""
+        return round(self.control_period / self.physics_step)
+
+
+FIELD = Conditions()
+PRESETS: dict[str, Conditions] = {
+    "ideal": Conditions(
+        thruster_time_constant=0.0,
+        thruster_limit=100.0,
+        position_noise=0.0,
+        current_limit=0.0,
+        coefficient_range=(1.0, 1.0),
+    ),
+    "field": FIELD,
+    "rough": Conditions(
+        thruster_time_constant=0.1,
+        thruster_limit=15.0,
+        position_noise=2e-4,
+        current_limit=0.1,
+        current_variation=0.05,
+        coefficient_range=(0.6, 1.5),
+        deflection_range=(0.9, 2.1),
+        filter_range=(8.0, 14.0),
+    ),
+}
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Water:
+    """The water of one episode, which no controller is told.
+
+    Attributes:
+        current: Constant part of the water's velocity, global frame, m/s.
+        amplitude: Amplitude of its sinusoidal part in each axis, m/s.
+        phase: Phase of that part at the start, rad.
+        period: Period of that part, s.
+        coefficients: True over nominal value of (c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the
+            same for all links.
+    """
+
+    current: tuple[Number, Number] = (0.0, 0.0)
+    amplitude: tuple[Number, Number] = (0.0, 0.0)
+    phase: tuple[Number, Number] = (0.0, 0.0)
+    period: Positive = 20.0
+    coefficients: tuple[Positive, Positive, Positive, Positive, Positive, Positive] = (1.0,) * 6
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Scenario:
+    """One episode, complete.
+
+    Attributes:
+        mode: "operation" or "torpedo".
+        path: Path of the centre of mass.
+        inspection: Joint motion.
+        conditions: Sensors, actuators, timing.
+        water: The water of this episode.
+        duration: Length of the episode, s; a multiple of the control period.
+        settle_time: From when on errors count, s.
+        noise_seed: Seed of the sensor noise.
+        joint_stiffness: Joint controllers' proportional gain, N m/rad; None: the robot's.
+        joint_damping: Joint controllers' derivative gain, N m s/rad; None: the robot's.
+        heading: Whether heading means the mean link angle or the head link's.
+        look_ahead: Look-ahead distance of the line-of-sight guidance, m; None: heading reference 0.
+        cross_track: Whether that guidance aims at the path, rather than at the x axis as the paper
+            prints it.
+    """
+
+    mode: Mode = "operation"
+    path: Path = Path()
+    inspection: Inspection = Inspection()
+    conditions: Conditions = FIELD
+    water: Water = Water()
+    duration: Positive = 40.0
+    settle_time: NonNegative = 5.0
+    noise_seed: int = Field(default=0, ge=0)
+    joint_stiffness: NonNegative | None = None
+    joint_damping: NonNegative | None = None
+    heading: Literal["mean", "head"] = "mean"
+    look_ahead: Positive | None = None
+    cross_track: Switch = False
+
+    def __post_init__(self) -> None:
+        """Refuse a duration of no whole number of control periods."""
+        steps = self.duration / self.conditions.control_period
+        require(
+            round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),
+            "duration",
+            self.duration,
+            f"a multiple of control_period = {self.conditions.control_period}",
+        )
+
+    @property
+    def steps(self) -> int:
+        """Control periods in the episode."""
+        return round(self.duration / self.conditions.control_period)
+
+    @property
+    def shifts(self) -> tuple[float, ...]:
+        """When the joint references change, s; empty if the joints keep still."""
+        return self.inspection.times if self.conditions.motion else ()
+
+    def noise(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Measurement error of the position at every control instant, m, shape (steps + 1, 2)."""
+        stream = np.random.default_rng(np.random.SeedSequence(self.noise_seed, spawn_key=(NOISE,)))
+        return self.conditions.position_noise * stream.standard_normal((self.steps + 1, 2))
+
+    def under(self, conditions: Conditions) -> Scenario:
+        """The same episode under other conditions, its water redrawn from the same noise seed."""
+        water = draw_water(conditions, self.noise_seed)
+        return dataclasses.replace(self, conditions=conditions, water=water)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scenario in JSON's types."""
+        data: dict[str, Any] = _ADAPTER.dump_python(self, mode="json")
+        return data
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> Scenario:
+        """Read what `to_dict` wrote; fields left out have their defaults.
+
+        Raises:
+            ValueError: If a key is unknown, or a value of the wrong type or out of range.
+        """
+        return _ADAPTER.validate_python(dict(data))
+
+
+_ADAPTER = TypeAdapter(Scenario)
+
+
+def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
+    """Conditions from a preset's name, or from fields that differ from the preset "field".
+
+    Raises:
+        ValueError: If the name or a field is unknown, or a value not allowed.
+    """
+    if isinstance(value, Conditions):
+        return value
+    if isinstance(value, str):
+        require(value in PRESETS, "conditions", value, ", ".join(PRESETS))
+        return PRESETS[value]
+    require(isinstance(value, Mapping), "conditions", value, "a preset's name or a dict of fields")
+    return Conditions(**value)
+
+
+def draw_water(conditions: Conditions, noise_seed: int) -> Water:
+    """Draw the water of an episode.
+
+    Every number comes from the same place of the same stream whatever the conditions, so that
+    a change of conditions stretches an episode's water rather than replace it.
+    """
+    stream = np.random.default_rng(np.random.SeedSequence(noise_seed, spawn_key=(WATER,)))
+    unit = stream.uniform(-1.0, 1.0, 4)
+    phase = stream.uniform(0.0, 2 * math.pi, 2)
+    period = stream.uniform(10.0, 40.0)
+    low, high = conditions.coefficient_range
+    coefficients = low + (high - low) * stream.random(6)
+    return Water(
+        current=_pair(conditions.current_limit * unit[:2]),
+        amplitude=_pair(conditions.current_variation * unit[2:]),
+        phase=_pair(phase),
+        period=period,
+        coefficients=tuple(coefficients.tolist()),
+    )
+
+
+def sample(
+    mode: Mode, conditions: Conditions, stream: np.random.Generator, joints: int = 15
+) -> Scenario:
+    """Draw a scenario of a mode (ranges: docs/model.md section 9).
+
+    Args:
+        mode: "operation" or "torpedo".
+        conditions: Conditions, whose ranges are used.
+        stream: Where all randomness comes from.
+        joints: Number of joints of the robot; a third to eleven fifteenths of them bend.
+    """
+    require(mode in MODES, "mode", mode, " or ".join(MODES))
+    if mode == "torpedo":
+        path = Path(
+            speed=stream.uniform(0.05, 0.3),
+            amplitude=stream.uniform(0.0, 0.5),
+            frequency=stream.uniform(0.03, 0.12),
+        )
+        inspection = STILL
+    else:
+        path = Path(
+            speed=stream.uniform(0.0, 0.1),
+            amplitude=stream.uniform(0.0, 0.25),
+            frequency=stream.uniform(0.03, 0.15),
+        )
+        bending_joints = int(stream.integers(max(1, joints // 3), max(1, 11 * joints // 15) + 1))
+        side = 1.0 if stream.random() < 0.5 else -1.0
+        first, second = stream.uniform(*conditions.deflection_range, 2)
+        third = stream.uniform(-0.35, 0.35)
+        times = np.array([10.0, 20.0, 30.0]) + stream.uniform(-2.0, 2.0, 3)
+        inspection = Inspection(
+            bending_joints=bending_joints,
+            times=tuple(times.tolist()),
+            deflections=(side * first, -side * second, third),
+            filter_frequency=stream.uniform(*conditions.filter_range),
+        )
+    noise_seed = int(stream.integers(2**63))
+    return dataclasses.replace(
+        named("nominal", mode, conditions),
+        path=path,
+        inspection=inspection,
+        water=draw_water(conditions, noise_seed),
+        noise_seed=noise_seed,
+    )
+
+
+def named(name: str, mode: Mode, conditions: Conditions | None = None) -> Scenario:
+    """The scenario "nominal" or "table1" of a mode (docs/model.md section 9).
+
+    Args:
+        name: "nominal", or "table1", the scenario of the paper's Table 1.
+        mode: "operation" or "torpedo".
+        conditions: Its conditions; without them "field" for nominal and "ideal" for table1.
+    """
+    require(name in ("nominal", "table1"), "scenario", name, "nominal, table1")
+    torpedo = mode == "torpedo"
+    if name == "nominal":
+        return Scenario(
+            mode=mode,
+            path=Path(speed=0.1) if torpedo else Path(),
+            inspection=STILL if torpedo else Inspection(),
+            conditions=conditions or FIELD,
+            look_ahead=2.24 if torpedo else None,
+        )
+    return Scenario(
+        mode=mode,
+        path=Path(ramp=0.0),
+        inspection=STILL if torpedo else Inspection(filter_frequency=None),
+        conditions=conditions or PRESETS["ideal"],
+        joint_stiffness=9000.0,
+        joint_damping=150.0,
+        look_ahead=2.24 if torpedo else None,
+    )
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    x, y = values.tolist()
+    return x, y

@@ -1,0 +1,286 @@
+"""Robots simulated side by side: scenarios in, commands in, observations and true errors out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.observation import ObservationLayout
+from usm_gym.plant import layout as rows
+from usm_gym.plant.chain import Body
+from usm_gym.plant.lanes import WIDTH
+from usm_gym.plant.measure import Table
+from usm_gym.plant.motion import filter_coefficients, lag_share
+from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles
+from usm_gym.robot import Robot
+from usm_gym.scenario import Conditions, Scenario
+from usm_gym.validation import require
+
+# A robot further from its reference than this, in either axis, is lost, m.
+LOST = 0.5
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A copy of everything that changes in a simulation.
+
+    Attributes:
+        scenarios: The scenarios in progress.
+        arrays: The state.
+    """
+
+    scenarios: tuple[Scenario, ...]
+    arrays: dict[str, NDArray[Any]]
+
+
+class Simulation:
+    """`size` copies of a robot, each in a scenario of its own, advanced in step.
+
+    All scenarios must agree in what the numbers of physics steps follow from: control period,
+    physics step, integrator and hydrodynamics.
+
+    Attributes:
+        robot: The robot.
+        size: How many there are.
+        layout: Layout of the observation.
+        scenarios: The scenario of each.
+        count: Control periods since each start, int64, (size,).
+        error: True position errors, m, (size, 2).
+        heading_error: Heading errors as known on board, rad, (size,).
+        observation: Observations, float32, (size, numbers).
+        max_error: Largest true errors so far after settling, m, (size, 2); 0 before.
+        steps: Control periods in each episode, int64, (size,).
+    """
+
+    def __init__(self, robot: Robot, scenarios: Sequence[Scenario]) -> None:
+        """Start all robots at the beginning of the given scenarios."""
+        self.robot = robot
+        self.size = len(scenarios)
+        self.layout = ObservationLayout(robot.links, len(robot.thrusters))
+        self._lanes = WIDTH if self.size > 1 else 1
+        self._kernel = run_lanes if self._lanes > 1 else run_singles
+        self._table = Table(self.layout.starts, self.layout.scale, self.layout.bound)
+        self._timing = _timing(scenarios[0].conditions)
+        blocks = -(-self.size // self._lanes)
+        numbers = rows.rows(robot.links, len(robot.thrusters))
+        self._rows = np.zeros((blocks, numbers, self._lanes))
+        self._idle_lanes()
+        self.scenarios = list(scenarios)
+        self.count = np.zeros(self.size, np.int64)
+        self.error = np.zeros((self.size, 2))
+        self.heading_error = np.zeros(self.size)
+        self.observation = np.zeros((self.size, self.layout.size), np.float32)
+        self.max_error = np.zeros((self.size, 2))
+        self.steps = np.zeros(self.size, np.int64)
+        self._settle_count = np.zeros(self.size, np.int64)
+        self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, 2))
+        self._share_out()
+        for index, scenario in enumerate(scenarios):
+            self.start(index, scenario)
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since each start, s, (size,)."""
+        return self.count * self._timing[0]
+
+    @property
+    def limit(self) -> NDArray[np.float64]:
+        """Thruster limits, N, (size,)."""
+        return self._column(rows.LIMIT)
+
+    @property
+    def command(self) -> NDArray[np.float64]:
+        """Last thruster commands after saturation, N, (size, thrusters)."""
+        return self._thrusters(rows.COMMAND)
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """True link angles, rad, (size, links)."""
+        return self._links(rows.THETA)
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """True position of the centre of mass, m, (size, 2)."""
+        return np.stack([self._column(rows.P_X), self._column(rows.P_Y)], axis=1)
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Which robots are lost: further than `LOST` from the reference, or not finite, (size,)."""
+        near = (np.abs(self.error) <= LOST).all(axis=1)
+        return ~(near & np.isfinite(self.heading_error))
+
+    def start(self, index: int, scenario: Scenario) -> None:
+        """Put one robot at the beginning of a scenario.
+
+        Raises:
+            ValueError: If the scenario does not fit the robot or the others' timing.
+        """
+        joints = self.robot.links - 1
+        require(
+            scenario.inspection.bending_joints <= joints,
+            "bending_joints",
+            scenario.inspection.bending_joints,
+            f"1 to {joints}, the robot's joints",
+        )
+        require(
+            _timing(scenario.conditions) == self._timing,
+            "conditions",
+            _timing(scenario.conditions),
+            f"control period, physics step, integrator and hydrodynamics as the others: "
+            f"{self._timing}",
+        )
+        self.scenarios[index] = scenario
+        self._write(index, scenario)
+        self.count[index] = 0
+        self.max_error[index] = 0.0
+        self.steps[index] = scenario.steps
+        self._settle_count[index] = np.ceil(
+            scenario.settle_time / scenario.conditions.control_period - 1e-9
+        )
+        noise = scenario.noise()
+        if len(noise) > self._noise.shape[1]:
+            longer = ((0, 0), (0, len(noise) - self._noise.shape[1]), (0, 0))
+            self._noise = np.pad(self._noise, longer)
+        self._noise[index, : len(noise)] = noise
+        self._share_out()
+        observe_one(self._fleet, self._plant, self._table, index, self._lanes)
+
+    def step(self, action: NDArray[Any]) -> None:
+        """Advance every robot by one control period.
+
+        Args:
+            action: Thruster commands over the thruster limits, (size, thrusters); values beyond
+                [-1, 1] saturate.
+        """
+        self._kernel(self._fleet, self._plant, self._table, action, 0, len(self._rows))
+        settled = self.count >= self._settle_count
+        np.maximum(
+            self.max_error, np.abs(self.error), out=self.max_error, where=settled[:, np.newaxis]
+        )
+        lost = self.lost
+        if lost.any():
+            self._tidy(lost)
+
+    def snapshot(self) -> Snapshot:
+        """Copy the whole state."""
+        return Snapshot(
+            tuple(self.scenarios),
+            {name: getattr(self, name).copy() for name in _STATE},
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a copied state; what follows then has the same bits as what followed it."""
+        for index, scenario in enumerate(snapshot.scenarios):
+            if scenario != self.scenarios[index]:
+                self.start(index, scenario)
+        for name, array in snapshot.arrays.items():
+            getattr(self, name)[...] = array
+
+    def _tidy(self, lost: NDArray[np.bool_]) -> None:
+        # A lost robot's observation is finite and inside its bounds all the same.
+        bound = self.layout.bound
+        seen = np.nan_to_num(self.observation[lost], nan=0.0)
+        self.observation[lost] = np.clip(seen, -bound, bound)
+
+    def _share_out(self) -> None:
+        """Gather what the kernel takes; arrays are shared, not copied."""
+        conditions = self.scenarios[0].conditions
+        implicit = conditions.physics_step if conditions.integrator == "symplectic" else 0.0
+        self._plant = Plant(
+            body=Body(
+                l=self.robot.half_length,
+                m=self.robot.link_mass,
+                J=self.robot.link_inertia,
+                h=implicit,
+                kirchhoff=float(conditions.hydrodynamics == "consistent"),
+            ),
+            links=self.robot.links,
+            thruster_links=self.robot.thruster_links,
+            thruster_is_normal=self.robot.thruster_is_normal,
+            h=conditions.physics_step,
+            substeps=conditions.substeps,
+            shifts=max(len(scenario.shifts) for scenario in self.scenarios),
+            moving_water=any(any(scenario.water.amplitude) for scenario in self.scenarios),
+        )
+        self._fleet = Fleet(
+            blocks=self._rows.reshape(len(self._rows), -1),
+            count=self.count,
+            noise=self._noise,
+            error=self.error,
+            heading_error=self.heading_error,
+            observation=self.observation,
+        )
+
+    def _write(self, index: int, scenario: Scenario) -> None:
+        """Write a scenario's parameters and its start, straight and at rest, into the rows."""
+        conditions, water, path = scenario.conditions, scenario.water, scenario.path
+        h = conditions.physics_step
+        row = self._rows[index // self._lanes, :, index % self._lanes]
+        row[:] = 0.0
+        nominal = np.array(self.robot.hydrodynamic_coefficients)
+        row[rows.C_T : rows.LAMBDA_3 + 1] = nominal * water.coefficients
+        row[[rows.WATER_X, rows.WATER_Y]] = water.current
+        row[[rows.MEAN_X, rows.MEAN_Y]] = water.current
+        row[[rows.AMPLITUDE_X, rows.AMPLITUDE_Y]] = water.amplitude
+        row[[rows.PHASE_X, rows.PHASE_Y]] = water.phase
+        row[rows.WATER_FREQUENCY] = 2 * np.pi / water.period
+        stiffness, damping = scenario.joint_stiffness, scenario.joint_damping
+        k_p = self.robot.joint_stiffness if stiffness is None else stiffness
+        k_d = self.robot.joint_damping if damping is None else damping
+        implicit = h if conditions.integrator == "symplectic" else 0.0
+        row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
+        row[rows.JOINT_INERTIA] = implicit * k_d + implicit**2 * k_p
+        motion = scenario.inspection
+        row[rows.BENDING_JOINTS] = motion.bending_joints
+        frequency = motion.filter_frequency
+        row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(
+            np.inf if frequency is None else frequency, h
+        )
+        row[rows.SHIFT_TIME : rows.SHIFT_SIZE] = np.inf
+        shifts = len(scenario.shifts)
+        row[rows.SHIFT_TIME : rows.SHIFT_TIME + shifts] = scenario.shifts
+        sizes = np.diff(motion.deflections, prepend=0.0)[:shifts]
+        row[rows.SHIFT_SIZE : rows.SHIFT_SIZE + shifts] = sizes
+        row[rows.LAG] = lag_share(conditions.thruster_time_constant, h)
+        row[rows.LIMIT] = conditions.thruster_limit
+        row[rows.SPEED], row[rows.SWAY] = path.speed, path.amplitude
+        row[rows.FREQUENCY], row[rows.RAMP] = path.frequency, path.ramp
+        row[rows.LOOK_AHEAD] = scenario.look_ahead or 0.0
+        row[rows.CROSS_TRACK] = scenario.cross_track
+        row[rows.HEAD_HEADING] = scenario.heading == "head"
+
+    def _idle_lanes(self) -> None:
+        # Lanes that fill up the last block hold robots that rest: numbers, not zeros divided.
+        self._rows[:, rows.BENDING_JOINTS] = 1.0
+        self._rows[:, rows.LIMIT] = 1.0
+
+    def _column(self, row: int) -> NDArray[np.float64]:
+        return self._rows[:, row].reshape(-1)[: self.size]
+
+    def _links(self, row: int) -> NDArray[np.float64]:
+        first, last = rows.HEADER + row, rows.HEADER + self.robot.links * rows.RECORD
+        return self._table_of(slice(first, last, rows.RECORD))
+
+    def _thrusters(self, row: int) -> NDArray[np.float64]:
+        first = rows.HEADER + self.robot.links * rows.RECORD + row
+        return self._table_of(slice(first, None, rows.THRUSTER))
+
+    def _table_of(self, which: slice) -> NDArray[np.float64]:
+        table = self._rows[:, which].swapaxes(1, 2)
+        return table.reshape(-1, table.shape[2])[: self.size]
+
+
+_STATE = ("_rows", "count", "error", "heading_error", "observation", "max_error")
+
+
+def _timing(conditions: Conditions) -> tuple[float, float, str, str]:
+    return (
+        conditions.control_period,
+        conditions.physics_step,
+        conditions.integrator,
+        conditions.hydrodynamics,
+    )
