@@ -3,13 +3,16 @@
 from importlib.metadata import version
 
 from usm_gym.dynamics import accelerations
+from usm_gym.evaluation import Evaluation, evaluate
 from usm_gym.metrics import max_error
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
 from usm_gym.scenario import Conditions, Inspection, Path, Scenario, Water
+from usm_gym.suites import suite
 
 __all__ = [
     "Conditions",
+    "Evaluation",
     "Inspection",
     "Path",
     "Robot",
@@ -17,7 +20,9 @@ __all__ = [
     "Thruster",
     "Water",
     "accelerations",
+    "evaluate",
     "max_error",
+    "suite",
 ]
 __version__ = version("usm-gym")
 

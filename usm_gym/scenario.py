@@ -128,6 +128,11 @@ class Conditions:
             require(0 < low <= high, name, (low, high), "0 < low <= high")
 
     @property
+    def timing(self) -> tuple[float, float, str, str]:
+        """What robots that are simulated side by side have to agree in."""
+        return self.control_period, self.physics_step, self.integrator, self.hydrodynamics
+
+    @property
     def substeps(self) -> int:
         """Physics steps in a control period."""
         return round(self.control_period / self.physics_step)

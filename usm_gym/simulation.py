@@ -17,7 +17,7 @@ from usm_gym.plant.measure import Table
 from usm_gym.plant.motion import filter_coefficients, lag_share
 from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles
 from usm_gym.robot import Robot
-from usm_gym.scenario import Conditions, Scenario
+from usm_gym.scenario import Scenario
 from usm_gym.validation import require
 
 # A robot further from its reference than this, in either axis, is lost, m.
@@ -64,7 +64,7 @@ class Simulation:
         self._lanes = WIDTH if self.size > 1 else 1
         self._kernel = run_lanes if self._lanes > 1 else run_singles
         self._table = Table(self.layout.starts, self.layout.scale, self.layout.bound)
-        self._timing = _timing(scenarios[0].conditions)
+        self._timing = scenarios[0].conditions.timing
         blocks = -(-self.size // self._lanes)
         numbers = rows.rows(robot.links, len(robot.thrusters))
         self._rows = np.zeros((blocks, numbers, self._lanes))
@@ -127,9 +127,9 @@ class Simulation:
             f"1 to {joints}, the robot's joints",
         )
         require(
-            _timing(scenario.conditions) == self._timing,
+            scenario.conditions.timing == self._timing,
             "conditions",
-            _timing(scenario.conditions),
+            scenario.conditions.timing,
             f"control period, physics step, integrator and hydrodynamics as the others: "
             f"{self._timing}",
         )
@@ -276,11 +276,3 @@ class Simulation:
 
 _STATE = ("_rows", "count", "error", "heading_error", "observation", "max_error")
 
-
-def _timing(conditions: Conditions) -> tuple[float, float, str, str]:
-    return (
-        conditions.control_period,
-        conditions.physics_step,
-        conditions.integrator,
-        conditions.hydrodynamics,
-    )

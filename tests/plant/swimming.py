@@ -89,11 +89,22 @@ def swim(robot: Robot, state: State, duration: float, hydrodynamics: str = "cons
         )
         return np.concatenate([theta_dot, p_dot, theta_ddot, p_ddot])
 
+    def headroom(_: float, y: Array) -> float:
+        return 1e3 - float(np.max(np.abs(y[n + 2 :])))
+
+    headroom.terminal = True  # type: ignore[attr-defined]  # a faulty plant shall fail, not hang
     start = np.concatenate([state.theta, np.zeros(2), state.theta_dot, state.p_dot])
     time = np.linspace(0.0, duration, 101)
     solution = solve_ivp(
-        derivative, (0.0, duration), start, "DOP853", t_eval=time, rtol=1e-12, atol=1e-12
+        derivative,
+        (0.0, duration),
+        start,
+        method="DOP853",
+        t_eval=time,
+        events=headroom,
+        rtol=1e-12,
+        atol=1e-12,
     )
-    assert solution.success, solution.message
+    assert solution.status == 0, solution.message
     y = solution.y.T
     return Motion(time, y[:, :n], y[:, n : n + 2], y[:, n + 2 : -2], y[:, -2:])

@@ -1,0 +1,263 @@
+"""What all control laws share: from the observation to signals, from a wrench to the action.
+
+A law sees the tracking error, the applied force and the reference, and answers with a force on the
+centre of mass; heading control and thruster allocation are the same for all. State is a plain array
+that the caller carries from call to call, in the manner of Stable-Baselines3's recurrent policies.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from usm_gym.nominal import Nominal
+from usm_gym.observation import ObservationLayout
+from usm_gym.plant.compile import compiled, piece
+from usm_gym.plant.elementary import sincos
+from usm_gym.plant.measure import (
+    HEADING_ERROR,
+    JOINT_ANGLES,
+    POSITION_ERROR,
+    REFERENCE_ACCELERATION,
+    REFERENCE_VELOCITY,
+    TAIL_ANGLE,
+    THRUSTER_COMMAND,
+    THRUSTER_LIMIT,
+)
+from usm_gym.plant.thrusters import allocate, allocation_matrix
+from usm_gym.validation import require
+
+Array = NDArray[np.float64]
+
+
+class Policy(Protocol):
+    """Anything that acts: Stable-Baselines3's `predict`, for one observation or a batch."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, Any]:
+        """Return the action, and the state to pass to the next call."""
+        ...
+
+
+class Model(NamedTuple):
+    """Nominal knowledge in the form that kernels take.
+
+    Attributes:
+        starts: First index of each entry of the observation.
+        scale: Physical value over observed value of each number.
+        links: Number of links.
+        l: Half the length of a link, m.
+        thruster_links: Zero-based link of each thruster.
+        thruster_is_normal: Whether each thruster pushes across its link.
+        mass: Total mass m_t, kg.
+        h: Control period, s.
+    """
+
+    starts: NDArray[np.int64]
+    scale: Array
+    links: int
+    l: float
+    thruster_links: NDArray[np.int64]
+    thruster_is_normal: NDArray[np.bool_]
+    mass: float
+    h: float
+
+
+class Signals(NamedTuple):
+    """What a control law works with, for a batch of robots.
+
+    Attributes:
+        started: 0.0 at the first call of an episode, else 1.0, (batch,).
+        y: Measured position error, m, (batch, 2).
+        u: Applied force over the mass less the reference's acceleration, m/s^2, (batch, 2).
+        velocity: Velocity of the reference, m/s, (batch, 2).
+        acceleration: Acceleration of the reference, m/s^2, (batch, 2).
+        allocation: Allocation matrices, (batch, 3, thrusters).
+    """
+
+    started: Array
+    y: Array
+    u: Array
+    velocity: Array
+    acceleration: Array
+    allocation: Array
+
+
+def model_of(nominal: Nominal) -> Model:
+    """The nominal knowledge for kernels."""
+    robot = nominal.robot
+    layout = ObservationLayout(robot.links, len(robot.thrusters))
+    return Model(
+        starts=layout.starts,
+        scale=layout.scale,
+        links=robot.links,
+        l=robot.half_length,
+        thruster_links=robot.thruster_links,
+        thruster_is_normal=robot.thruster_is_normal,
+        mass=robot.total_mass,
+        h=nominal.control_period,
+    )
+
+
+@piece
+def value(observation, model, entry, index):
+    """One number of an observation in its physical unit."""
+    k = model.starts[entry] + index
+    return observation[k] * model.scale[k]
+
+
+@compiled
+def sense(observation, state, model, signals):
+    """Fill in the signals from observations and the shared part of the state.
+
+    The applied force is the last command after saturation, projected with the link angles at the
+    time of that command, which the state has kept.
+    """
+    thrusters = model.thruster_links.size
+    sine, cosine = np.empty(model.links), np.empty(model.links)
+    for b in range(observation.shape[0]):
+        seen = observation[b]
+        signals.started[b] = state[b, 0]
+        limit = value(seen, model, THRUSTER_LIMIT, 0)
+        for axis in range(2):
+            force = 0.0
+            for j in range(thrusters):
+                command = value(seen, model, THRUSTER_COMMAND, j) * limit
+                force += state[b, 1 + axis * thrusters + j] * command
+            acceleration = value(seen, model, REFERENCE_ACCELERATION, axis)
+            signals.y[b, axis] = value(seen, model, POSITION_ERROR, axis)
+            signals.velocity[b, axis] = value(seen, model, REFERENCE_VELOCITY, axis)
+            signals.acceleration[b, axis] = acceleration
+            signals.u[b, axis] = force / model.mass - acceleration
+        theta = value(seen, model, TAIL_ANGLE, 0)
+        sine[0], cosine[0] = sincos(theta)
+        for i in range(model.links - 1):
+            theta -= value(seen, model, JOINT_ANGLES, i)
+            sine[i + 1], cosine[i + 1] = sincos(theta)
+        T = signals.allocation[b]
+        allocation_matrix(
+            sine, cosine, model.l, model.thruster_links, model.thruster_is_normal, T
+        )
+
+
+@compiled
+def act(observation, state, model, allocation, force, heading_gain, action):
+    """Fill in the actions that make the forces (N) and a proportional heading moment."""
+    thrusters = model.thruster_links.size
+    forces = np.empty(thrusters)
+    for b in range(observation.shape[0]):
+        seen, T = observation[b], allocation[b]
+        moment = -heading_gain * value(seen, model, HEADING_ERROR, 0)
+        allocate(T, force[b, 0], force[b, 1], moment, forces)
+        limit = value(seen, model, THRUSTER_LIMIT, 0)
+        state[b, 0] = 1.0
+        for j in range(thrusters):
+            action[b, j] = forces[j] / limit
+            state[b, 1 + j] = T[0, j]
+            state[b, 1 + thrusters + j] = T[1, j]
+
+
+class ScriptedPolicy:
+    """A control law behind `predict`; subclasses give `law_size` and `force`.
+
+    Actions are not clipped: the environment saturates them, and what it has applied comes back in
+    the next observation.
+
+    Attributes:
+        nominal: What the policy knows of the robot.
+        gains: The law's gains, a named tuple with the field `heading_gain`, N m/rad.
+        privileged: Whether it has to be given true state; never, here.
+    """
+
+    privileged = False
+    # Numbers of state that the law keeps for each axis.
+    law_size = 0
+
+    def __init__(self, nominal: Nominal, gains: Any) -> None:
+        """Keep nominal knowledge and gains.
+
+        Raises:
+            ValueError: If a gain is negative or not finite.
+        """
+        for name, gain in gains._asdict().items():
+            require(np.isfinite(gain) and gain >= 0, name, gain, "a finite number >= 0")
+        self.nominal = nominal
+        self.gains = gains
+        self._model = model_of(nominal)
+        self._thrusters = len(nominal.robot.thrusters)
+
+    def force(self, signals: Signals, law_state: Array) -> Array:
+        """The force on the centre of mass, N, (batch, 2); the law's state is advanced in place.
+
+        Args:
+            signals: What the law works with.
+            law_state: The law's own state, (batch, 2, law_size), zero at the start.
+        """
+        raise NotImplementedError
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Array | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Act on one observation, or on each of a batch.
+
+        Args:
+            observation: Observation, (numbers,) or (batch, numbers).
+            state: What the last call returned; None at the start.
+            episode_start: Where an episode starts and the state is to be forgotten, bool, a scalar
+                or (batch,).
+            deterministic: Without effect: the laws are deterministic.
+
+        Returns:
+            Thruster commands over the limit, not clipped, (thrusters,) or (batch, thrusters), and
+            the state for the next call.
+
+        Raises:
+            ValueError: If the shape of the observation or the state is wrong.
+        """
+        seen = np.asarray(observation, np.float32)
+        numbers = self._model.scale.size
+        require(
+            seen.ndim in (1, 2) and seen.shape[-1] == numbers,
+            "the observation's shape",
+            seen.shape,
+            f"({numbers},) or (batch, {numbers})",
+        )
+        batch = np.atleast_2d(seen)
+        new_state = self._state(len(batch), state, episode_start)
+        action = self._act(batch, new_state)
+        return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
+
+    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
+        size, thrusters = len(observation), self._thrusters
+        axes = np.empty((4, size, 2))
+        signals = Signals(np.empty(size), *axes, np.empty((size, 3, thrusters)))
+        sense(observation, state, self._model, signals)
+        law_state = state[:, 1 + 2 * thrusters :].reshape(size, 2, self.law_size)
+        force = self.force(signals, law_state)
+        # Where the reshape had to copy, the advanced state has to be written back.
+        state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)
+        action = np.empty((size, thrusters), np.float32)
+        gain = float(self.gains.heading_gain)
+        act(observation, state, self._model, signals.allocation, force, gain, action)
+        return action
+
+    def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:
+        numbers = 1 + 2 * self._thrusters + 2 * self.law_size
+        if state is None:
+            return np.zeros((size, numbers))
+        new = np.array(state, np.float64)
+        require(new.shape == (size, numbers), "state", new.shape, f"shape ({size}, {numbers})")
+        if episode_start is not None:
+            new[np.broadcast_to(np.asarray(episode_start, bool), (size,))] = 0.0
+        return new

@@ -1,0 +1,125 @@
+"""Policies by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from baselines.pd import PD
+from baselines.policy import Policy
+from baselines.super_twisting import SuperTwisting
+from baselines.zero import Zero
+from usm_gym.nominal import Nominal
+from usm_gym.validation import require
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A registered policy.
+
+    Attributes:
+        factory: Makes the policy from nominal knowledge; keyword arguments are its gains.
+        summary: What it is, in a line.
+        slow: Whether to leave it out of evaluations unless it is asked for.
+        privileged: Whether it is given true state, and so is no competitor.
+    """
+
+    factory: Callable[..., Policy]
+    summary: str
+    slow: bool = False
+    privileged: bool = False
+
+
+_entries: dict[str, Entry] = {}
+
+
+def register(
+    id: str,
+    factory: Callable[..., Policy],
+    summary: str,
+    *,
+    slow: bool = False,
+    privileged: bool = False,
+) -> None:
+    """Register a policy.
+
+    Args:
+        id: Its name.
+        factory: `factory(nominal, **gains)` returns an object with `predict`; it is given
+            `env.unwrapped.nominal` and no more of the environment.
+        summary: What it is, in a line.
+        slow: Whether to leave it out of evaluations unless it is asked for.
+        privileged: Whether it is given true state.
+
+    Raises:
+        ValueError: If the name is taken.
+    """
+    require(id not in _entries, "id", id, "a name that is not taken")
+    _entries[id] = Entry(factory, summary, slow, privileged)
+
+
+def ids() -> list[str]:
+    """Names of all registered policies, in the order of registration."""
+    return list(_entries)
+
+
+def entry(id: str) -> Entry:
+    """The registered policy of a name.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    require(id in _entries, "policy", id, ", ".join(_entries))
+    return _entries[id]
+
+
+def make(id: str, env: Any, **gains: Any) -> Policy:
+    """Make a policy for an environment.
+
+    Args:
+        id: Name of the policy.
+        env: Environment, single or vector, or the `Nominal` knowledge itself.
+        gains: Gains other than the defaults, by name.
+
+    Raises:
+        ValueError: If the policy or a gain is unknown, or the environment says nothing of its robot.
+    """
+    policy = entry(id)
+    try:
+        return policy.factory(nominal_knowledge(env), **gains)
+    except TypeError as error:
+        require(not gains, "gains", gains, f"those of the policy ({error})")
+        raise
+
+
+def nominal_knowledge(env: Any) -> Nominal:
+    """The nominal knowledge of an environment, whatever it is wrapped in."""
+    if isinstance(env, Nominal):
+        return env
+    inner = getattr(env, "unwrapped", env)
+    if hasattr(inner, "nominal"):
+        nominal = inner.nominal
+    else:
+        require(hasattr(inner, "get_attr"), "env", env, "an environment of this package")
+        nominal = inner.get_attr("nominal")[0]
+    require(isinstance(nominal, Nominal), "env", env, "an environment of this package")
+    known: Nominal = nominal
+    return known
+
+
+register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
+register(
+    "sta-explicit",
+    partial(SuperTwisting, implicit=False),
+    "the same by Euler's forward method, as the paper has it",
+)
+register("pd", PD, "PD (21) as a force, the paper's gains")
+register("pd-mass", partial(PD, reading="mass"), "PD (21) times the mass, with feedforward")
+register(
+    "pd-observer",
+    partial(PD, reading="observer"),
+    "PD (21) in the place of u_STA in (19), the paper's words to the letter",
+)
+register("zero", Zero, "no thrust")

@@ -1,0 +1,153 @@
+"""The adaptive super-twisting controller, equations (10)-(14) and (18)-(20) of the paper."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.observer import observe, observer_gains
+from baselines.policy import Array, ScriptedPolicy, Signals
+from usm_gym.nominal import Nominal
+from usm_gym.plant.compile import compiled, piece
+from usm_gym.validation import require
+
+
+class SuperTwistingGains(NamedTuple):
+    """Gains of the adaptive STA, those of section 5.2.1 by default.
+
+    Attributes:
+        observer_gain: L of the observer, m/s^3; bounds the rate of the disturbance.
+        k2_exponent: Exponent of L in k2: 0.5 as printed, or 2/3.
+        surface: lambda of the sliding variable (10), 1/s.
+        epsilon: epsilon of (13).
+        beta_offset: lambda of (13), which the paper gives the same letter as that of (10).
+        gamma: gamma_1 of (12).
+        omega: omega_1 of (12).
+        dead_zone: alpha_m of (14), m/s: below it alpha keeps still.
+        alpha_start: alpha at the start, which the paper does not print.
+        heading_gain: k_psi, N m/rad.
+    """
+
+    observer_gain: float = 55.0
+    k2_exponent: float = 0.5
+    surface: float = 1.0
+    epsilon: float = 1.0
+    beta_offset: float = 1.0
+    gamma: float = 1.0
+    omega: float = 8.0
+    dead_zone: float = 0.05
+    alpha_start: float = 0.0
+    heading_gain: float = 100.0
+
+
+@piece
+def adapt(sigma, alpha, h, gains):
+    """(beta, next alpha) of (12)-(14); alpha grows while |sigma| is outside the dead zone."""
+    beta = 2.0 * gains.epsilon * alpha + gains.beta_offset + 4.0 * gains.epsilon * gains.epsilon
+    growth = gains.omega * np.sqrt(gains.gamma / 2.0) if abs(sigma) > gains.dead_zone else 0.0
+    return beta, alpha + h * growth
+
+
+@piece
+def implicit_super_twisting(sigma, h, gains, state):
+    """u_STA of (11) by an implicit step, exact in its sliding set.
+
+    Args:
+        sigma: Sliding variable, m/s.
+        h: Step, s.
+        gains: Gains.
+        state: (v, alpha) in an array; becomes that of the next step.
+    """
+    alpha = state[1]
+    beta, state[1] = adapt(sigma, alpha, h, gains)
+    b = sigma + h * state[0]
+    sliding = h * h * beta
+    xi, root = b / sliding, 0.0
+    if abs(b) > sliding:
+        xi = 1.0 if b > 0.0 else -1.0
+        half = 0.5 * h * alpha
+        root = np.sqrt(half * half + abs(b) - sliding) - half
+    state[0] -= h * beta * xi
+    return state[0] - alpha * root * xi
+
+
+@piece
+def explicit_super_twisting(sigma, h, gains, state):
+    """u_STA of (11) by Euler's forward method; see the implicit one."""
+    v, alpha = state[0], state[1]
+    beta, state[1] = adapt(sigma, alpha, h, gains)
+    sign = np.sign(sigma)
+    state[0] -= h * beta * sign
+    return v - alpha * np.sqrt(abs(sigma)) * sign
+
+
+@piece
+def super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, state):
+    """Force on the centre of mass in one axis, (19), N.
+
+    Args:
+        z1: First correction of the observer, m/s.
+        z2: Second correction of the observer, m/s^2.
+        acceleration: Acceleration of the reference, m/s^2.
+        h: Control period, s.
+        mass: Total mass m_t, kg.
+        gains: Gains.
+        implicit: Whether to discretise implicitly.
+        state: (p1, p2, p3, e1, v, alpha); v and alpha are advanced in place.
+    """
+    sigma = gains.surface * state[0] + state[1]
+    if implicit:
+        u_sta = implicit_super_twisting(sigma, h, gains, state[4:])
+    else:
+        u_sta = explicit_super_twisting(sigma, h, gains, state[4:])
+    return mass * (-gains.surface * (state[1] + z1) - state[2] - z2 + acceleration + u_sta)
+
+
+@compiled
+def super_twisting(signals, h, mass, gains, implicit, state, force):
+    """Observer and controller for a batch, both axes; fills in the force, (batch, 2)."""
+    k = observer_gains(gains.observer_gain, gains.k2_exponent)
+    for b in range(force.shape[0]):
+        for axis in range(2):
+            own = state[b, axis]
+            if signals.started[b] == 0.0:
+                own[5] = gains.alpha_start
+            z1, z2 = observe(
+                implicit,
+                signals.started[b],
+                signals.y[b, axis],
+                signals.u[b, axis],
+                signals.velocity[b, axis],
+                h,
+                k,
+                own,
+            )
+            acceleration = signals.acceleration[b, axis]
+            force[b, axis] = super_twisting_force(
+                z1, z2, acceleration, h, mass, gains, implicit, own
+            )
+
+
+class SuperTwisting(ScriptedPolicy):
+    """The paper's controller: adaptive super-twisting on a third-order sliding-mode observer."""
+
+    law_size = 6
+
+    def __init__(self, nominal: Nominal, implicit: bool = True, **gains: float) -> None:
+        """Take gains other than the paper's by name, see `SuperTwistingGains`."""
+        super().__init__(nominal, SuperTwistingGains(**gains))
+        require(
+            self.gains.k2_exponent in (0.5, 2 / 3),
+            "k2_exponent",
+            self.gains.k2_exponent,
+            "0.5 or 2/3",
+        )
+        self._implicit = implicit
+
+    def force(self, signals: Signals, law_state: Array) -> Array:
+        """The control (19)."""
+        force = np.empty_like(signals.y)
+        model = self._model
+        super_twisting(signals, model.h, model.mass, self.gains, self._implicit, law_state, force)
+        return force

@@ -1,0 +1,227 @@
+"""The one rollout loop that scores every policy, scripted or learned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import joblib
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym import metrics
+from usm_gym.robot import Robot
+from usm_gym.scenario import Scenario
+from usm_gym.simulation import Simulation
+from usm_gym.statistics import mean_interval
+from usm_gym.validation import require
+
+AXES = ("x", "y")
+POSITION_METRICS = tuple(
+    f"{name}_{axis}" for name in ("max_error", "settled_error", "rms_error") for axis in AXES
+)
+METRICS = (
+    *POSITION_METRICS,
+    "heading_error",
+    "thrust_effort",
+    "thrust_variation",
+    "saturation_share",
+)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What happened in an episode, at the control instants after each step, up to a loss.
+
+    Attributes:
+        scenario: The episode's scenario.
+        time: Times, s, (samples,).
+        error: True position errors, m, (samples, 2).
+        heading_error: Heading errors, rad, (samples,).
+        command: Thruster commands after saturation, N, (samples, thrusters).
+        lost: Whether the robot was lost.
+    """
+
+    scenario: Scenario
+    time: NDArray[np.float64]
+    error: NDArray[np.float64]
+    heading_error: NDArray[np.float64]
+    command: NDArray[np.float64]
+    lost: bool
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Scores of a policy, per episode in the order of the scenarios.
+
+    Attributes:
+        per_episode: Values of each metric of `METRICS`, (episodes,).
+        failed: Which episodes lost the robot, (episodes,).
+    """
+
+    per_episode: dict[str, NDArray[np.float64]]
+    failed: NDArray[np.bool_]
+
+    def summary(self) -> dict[str, Any]:
+        """Mean with interval and worst episode of each metric, failures, and all episodes."""
+        row: dict[str, Any] = {}
+        for name, values in self.per_episode.items():
+            mean, interval = mean_interval(values)
+            row[name] = {"mean": mean, "ci95": list(interval), "worst": float(values.max())}
+        row["failures"] = int(self.failed.sum())
+        row["per_episode"] = {name: values.tolist() for name, values in self.per_episode.items()}
+        row["per_episode"]["failed"] = self.failed.tolist()
+        return row
+
+
+def evaluate(
+    policy: Any,
+    scenarios: Sequence[Scenario],
+    *,
+    robot: Robot | None = None,
+    workers: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Evaluation:
+    """Score a policy on scenarios, each with its own noise.
+
+    Args:
+        policy: Anything with `predict`; it is called with a batch axis. To be pickled for more than
+            one worker.
+        scenarios: The episodes.
+        robot: The robot; without one, the paper's.
+        workers: Number of processes; without effect on the result.
+        progress: Called now and then with the number of episodes done since the last call; with
+            one worker, fractions of them.
+
+    Returns:
+        The scores.
+
+    Raises:
+        ValueError: If there is no scenario, or the policy returns what is no action.
+    """
+    require(len(scenarios) > 0, "scenarios", scenarios, "one or more")
+    require(workers >= 1, "workers", workers, "1 or more")
+    report = progress or (lambda episodes: None)
+    body = robot or Robot()
+    if workers == 1:
+        rows = [score(each) for each in rollout(policy, scenarios, body, report)]
+    else:
+        size = -(-len(scenarios) // workers)
+        chunks = [scenarios[i : i + size] for i in range(0, len(scenarios), size)]
+        tasks = (joblib.delayed(_score_all)(policy, chunk, body) for chunk in chunks)
+        rows = []
+        for part in joblib.Parallel(n_jobs=workers, return_as="generator")(tasks):
+            rows.extend(part)
+            report(len(part))
+    return Evaluation(
+        per_episode={name: np.array([row[name] for row in rows]) for name in METRICS},
+        failed=np.array([bool(row["failed"]) for row in rows]),
+    )
+
+
+def rollout(
+    policy: Any,
+    scenarios: Sequence[Scenario],
+    robot: Robot,
+    progress: Callable[[float], None] = lambda episodes: None,
+) -> list[Trajectory]:
+    """Run a policy through scenarios, side by side as far as their timing agrees."""
+    trajectories: dict[int, Trajectory] = {}
+    order = sorted(range(len(scenarios)), key=lambda i: (scenarios[i].conditions.timing, i))
+    for _, group in groupby(order, key=lambda i: scenarios[i].conditions.timing):
+        indices = list(group)
+        batch = [scenarios[i] for i in indices]
+        trajectories.update(zip(indices, _run(policy, batch, robot, progress), strict=True))
+    return [trajectories[i] for i in range(len(scenarios))]
+
+
+def score(trajectory: Trajectory) -> dict[str, float | bool]:
+    """The metrics of an episode; a lost one counts as at least 0.5 m in both axes."""
+    scenario, time, error = trajectory.scenario, trajectory.time, trajectory.error
+    settle = scenario.settle_time
+    if trajectory.lost:
+        known = error[np.isfinite(error).all(axis=1)]
+        largest = max(metrics.LOST_ERROR, float(np.abs(known).max(initial=0.0)))
+        row = dict.fromkeys(POSITION_METRICS, largest)
+        heading = np.abs(np.nan_to_num(trajectory.heading_error)).max()
+    else:
+        values = np.concatenate(
+            [
+                metrics.max_error(time, error, settle),
+                metrics.settled_error(time, error, scenario.shifts, settle),
+                metrics.rms_error(time, error, settle),
+            ]
+        )
+        row = dict(zip(POSITION_METRICS, values.tolist(), strict=True))
+        heading = np.abs(trajectory.heading_error[time >= settle]).max()
+    period, limit = scenario.conditions.control_period, scenario.conditions.thruster_limit
+    return {
+        **row,
+        "heading_error": float(heading),
+        "thrust_effort": metrics.thrust_effort(trajectory.command),
+        "thrust_variation": metrics.thrust_variation(trajectory.command, period),
+        "saturation_share": metrics.saturation_share(trajectory.command, limit),
+        "failed": trajectory.lost,
+    }
+
+
+def _run(
+    policy: Any,
+    scenarios: Sequence[Scenario],
+    robot: Robot,
+    progress: Callable[[float], None],
+) -> list[Trajectory]:
+    simulation = Simulation(robot, scenarios)
+    size, thrusters = simulation.size, len(robot.thrusters)
+    length = int(simulation.steps.max())
+    error = np.empty((length, size, 2))
+    heading = np.empty((length, size))
+    command = np.empty((length, size, thrusters))
+    ends = simulation.steps.copy()
+    lost = np.zeros(size, bool)
+    state: Any = None
+    start = np.ones(size, bool)
+    for k in range(length):
+        action, state = policy.predict(simulation.observation, state, start, deterministic=True)
+        action = np.asarray(action, np.float32)
+        require(
+            action.shape == (size, thrusters),
+            "the shape of the policy's action",
+            action.shape,
+            f"({size}, {thrusters})",
+        )
+        alive = (k < ends) & ~lost
+        require(np.isfinite(action[alive]).all(), "the policy's action", "NaN", "numbers")
+        simulation.step(np.nan_to_num(action))
+        error[k], heading[k] = simulation.error, simulation.heading_error
+        command[k] = simulation.command
+        now = simulation.lost & alive
+        ends[now] = k + 1
+        lost |= now
+        start[:] = False
+        if k % 100 == 99 or k == length - 1:
+            progress(size * (k % 100 + 1) / length)
+            if lost.all():
+                progress(size * (length - 1 - k) / length)
+                break
+    period = scenarios[0].conditions.control_period
+    return [
+        Trajectory(
+            scenario=scenario,
+            time=np.arange(1, end + 1) * period,
+            error=error[:end, i],
+            heading_error=heading[:end, i],
+            command=command[:end, i],
+            lost=bool(lost[i]),
+        )
+        for i, (scenario, end) in enumerate(zip(scenarios, ends, strict=True))
+    ]
+
+
+def _score_all(
+    policy: Any, scenarios: Sequence[Scenario], robot: Robot
+) -> list[dict[str, float | bool]]:
+    return [score(each) for each in rollout(policy, scenarios, robot)]
+

@@ -1,0 +1,46 @@
+"""Write a frozen suite; refuses to write one that exists."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from usm_gym.files import write_text
+from usm_gym.scenario import MODES, PRESETS, Mode, Scenario, named, sample
+from usm_gym.seeding import SUITE, stream
+from usm_gym.suites import NAMES
+from usm_gym.validation import require
+
+SEED = 20261122
+RECIPES: dict[str, tuple[Mode, str, int]] = {
+    "operation": ("operation", "field", 50),
+    "operation-ideal": ("operation", "ideal", 20),
+    "operation-rough": ("operation", "rough", 50),
+    "torpedo": ("torpedo", "field", 50),
+}
+
+
+def scenarios(name: str) -> list[Scenario]:
+    """Draw the scenarios of a suite."""
+    if name == "table1":
+        return [named("table1", mode) for mode in MODES]
+    mode, conditions, count = RECIPES[name]
+    key = NAMES.index(name)
+    return [sample(mode, PRESETS[conditions], stream(SEED, SUITE, key, i)) for i in range(count)]
+
+
+def main(name: str) -> None:
+    """Write the suite of a name beside this file."""
+    require(name in NAMES, "suite", name, ", ".join(NAMES))
+    path = Path(__file__).with_name(f"{name}.json")
+    require(not path.exists(), "suite", name, "one that is not frozen yet")
+    lines = ",\n".join("  " + json.dumps(scenario.to_dict()) for scenario in scenarios(name))
+    head = json.dumps({"suite": name, "seed": SEED, "command": f"python -m usm_gym.suites {name}"})
+    write_text(path, f'{head[:-1]}, "scenarios": [\n{lines}\n]}}\n')
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(f"usage: python -m usm_gym.suites {{{','.join(NAMES)}}}")
+    main(sys.argv[1])
