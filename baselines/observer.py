@@ -67,7 +67,7 @@ def implicit_observer(y, u, h, k, state):
 
 @piece
 def explicit_observer(y, u, h, k, state):
-    """One step of Euler's forward method on (15)-(16), as the paper has it; see the implicit one."""
+    """One step of Euler's forward method on (15)-(16), as in the paper; see the implicit one."""
     k1, k2, k3 = k
     r = cube_root(abs(state[3]))
     sign = np.sign(state[3])

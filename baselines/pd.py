@@ -75,9 +75,7 @@ def pd(signals, h, mass, gains, reading, state, force):
                 state[b, axis],
             )
             acceleration = signals.acceleration[b, axis]
-            force[b, axis] = pd_force(
-                z1, z2, acceleration, mass, gains, reading, state[b, axis]
-            )
+            force[b, axis] = pd_force(z1, z2, acceleration, mass, gains, reading, state[b, axis])
 
 
 class PD(ScriptedPolicy):

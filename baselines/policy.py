@@ -142,9 +142,7 @@ def sense(observation, state, model, signals):
             theta -= value(seen, model, JOINT_ANGLES, i)
             sine[i + 1], cosine[i + 1] = sincos(theta)
         T = signals.allocation[b]
-        allocation_matrix(
-            sine, cosine, model.l, model.thruster_links, model.thruster_is_normal, T
-        )
+        allocation_matrix(sine, cosine, model.l, model.thruster_links, model.thruster_is_normal, T)
 
 
 @compiled
@@ -240,8 +238,9 @@ class ScriptedPolicy:
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         size, thrusters = len(observation), self._thrusters
-        axes = np.empty((4, size, 2))
-        signals = Signals(np.empty(size), *axes, np.empty((size, 3, thrusters)))
+        y, u, velocity, acceleration = np.empty((4, size, 2))
+        allocation = np.empty((size, 3, thrusters))
+        signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation)
         sense(observation, state, self._model, signals)
         law_state = state[:, 1 + 2 * thrusters :].reshape(size, 2, self.law_size)
         force = self.force(signals, law_state)

@@ -84,7 +84,7 @@ def make(id: str, env: Any, **gains: Any) -> Policy:
         gains: Gains other than the defaults, by name.
 
     Raises:
-        ValueError: If the policy or a gain is unknown, or the environment says nothing of its robot.
+        ValueError: If the policy or a gain is unknown, or the environment is none of this package.
     """
     policy = entry(id)
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -73,7 +73,7 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     | key | unit | meaning |
     |---|---|---|
     | `error_x`, `error_y` | m | true position error |
-    | `max_error_x`, `max_error_y` | m | its largest absolute value since the settle time; 0 before |
+    | `max_error_x`, `max_error_y` | m | its largest absolute value since settling; 0 before |
     | `heading_error` | rad | heading minus its reference, as known on board |
     | `thrust_effort` | N | mean absolute command of the thrusters |
     | `diverged` | 0 or 1 | whether the robot is lost |
@@ -82,15 +82,15 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     | argument | default | meaning |
     |---|---|---|
-    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of fields of `usm_gym.Conditions` on top of "field" |
-    | `robot` | the paper's | a dict of fields of `usm_gym.Robot` |
+    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of `Conditions` fields |
+    | `robot` | the paper's | a dict of `Robot` fields |
 
     ## Version history
 
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 50}
+    metadata = {"render_modes": [], "render_fps": 50}  # noqa: RUF012 (Gymnasium's declaration)
 
     def __init__(
         self,
@@ -154,7 +154,7 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
             ValueError: If the action has the wrong shape or is not finite.
         """
         simulation = self._running
-        batch = checked_action(action, self.action_space.shape)[np.newaxis]
+        batch = checked_action(action, (len(self.robot.thrusters),))[np.newaxis]
         simulation.step(batch)
         rewards, terminated, truncated = outcome(simulation)
         return (
@@ -190,7 +190,7 @@ USMEnv.__doc__ = (USMEnv.__doc__ or "").replace(
 )
 
 
-def action_space(robot: Robot) -> gym.spaces.Box:
+def action_space(robot: Robot) -> gym.Space[NDArray[np.float32]]:
     """The action space of a robot."""
     return gym.spaces.Box(-1.0, 1.0, (len(robot.thrusters),), np.float32)
 

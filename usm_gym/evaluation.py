@@ -210,7 +210,7 @@ def _run(
     return [
         Trajectory(
             scenario=scenario,
-            time=np.arange(1, end + 1) * period,
+            time=np.arange(1, end + 1, dtype=np.float64) * period,
             error=error[:end, i],
             heading_error=heading[:end, i],
             command=command[:end, i],
@@ -224,4 +224,3 @@ def _score_all(
     policy: Any, scenarios: Sequence[Scenario], robot: Robot
 ) -> list[dict[str, float | bool]]:
     return [score(each) for each in rollout(policy, scenarios, robot)]
-

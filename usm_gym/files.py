@@ -13,9 +13,14 @@ def check_writable(path: str | Path) -> None:
     """Raise `OSError` now if a file could not be written later."""
     target = Path(path)
     if target.is_dir():
-        raise IsADirectoryError(f"{target} is a directory")
-    with tempfile.NamedTemporaryFile(dir=target.parent):
-        pass
+        raise IsADirectoryError(f"cannot write {target}: it is a directory")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {target}: there is no directory {target.parent}")
+    try:
+        with tempfile.NamedTemporaryFile(dir=target.parent):
+            pass
+    except OSError as error:
+        raise type(error)(f"cannot write {target}: {error.strerror}") from error
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -60,7 +60,12 @@ class ObservationLayout:
             ),
             Entry("reference_velocity", 2, "m/s", 0.1, 5.0, "velocity of the reference (x, y)"),
             Entry(
-                "reference_acceleration", 2, "m/s^2", 0.1, 5.0, "acceleration of the reference (x, y)"
+                "reference_acceleration",
+                2,
+                "m/s^2",
+                0.1,
+                5.0,
+                "acceleration of the reference (x, y)",
             ),
             Entry("tail_angle", 1, "rad", 1.0, 100.0, "angle of link 1, never wrapped (compass)"),
             Entry("tail_rate", 1, "rad/s", 1.0, 100.0, "its rate (gyro)"),
@@ -128,7 +133,7 @@ class ObservationLayout:
         return np.concatenate(bounds).astype(np.float32)
 
     @property
-    def space(self) -> gym.spaces.Box:
+    def space(self) -> gym.Space[NDArray[np.float32]]:
         """The observation space."""
         return gym.spaces.Box(-self.bound, self.bound, dtype=np.float32)
 

@@ -31,9 +31,9 @@ def reward(
     distance = np.abs(error)
     cost = (distance / (distance + HALF_COST_ERROR)).mean(axis=1)
     effort = np.abs(command).mean(axis=1) / limit
-    return -ERROR_COST * cost - EFFORT_COST * effort
+    return np.asarray(-ERROR_COST * cost - EFFORT_COST * effort, np.float64)
 
 
 def reward_of_loss(remaining: NDArray[np.int64]) -> NDArray[np.float64]:
     """Reward of the step that loses the robot: the worst for it and for all remaining steps."""
-    return WORST * (1.0 + remaining)
+    return np.asarray(WORST * (1.0 + remaining), np.float64)

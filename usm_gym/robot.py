@@ -51,7 +51,7 @@ class Robot:
         links: Number of links, 2 or more.
         link_length: Length of one link, 2l, m.
         link_mass: Mass of one link, kg; the default makes it neutrally buoyant.
-        half_height: Semi-axis a of the elliptic section, m; added mass across the link grows with its square.
+        half_height: Semi-axis a of the elliptic section, m.
         half_width: Semi-axis b of the elliptic section, m.
         water_density: Density of the water, kg/m^3.
         friction_coefficient: C_f, skin friction, dimensionless.
@@ -81,9 +81,7 @@ class Robot:
         """Refuse a single link and a layout that leaves a planar wrench out of reach."""
         require(self.links >= 2, "links", self.links, "2 or more")
         for thruster in self.thrusters:
-            require(
-                thruster.link <= self.links, "thrusters", thruster, f"links 1 to {self.links}"
-            )
+            require(thruster.link <= self.links, "thrusters", thruster, f"links 1 to {self.links}")
         require(
             np.linalg.matrix_rank(self._straight_allocation()) == 3,
             "thrusters",
@@ -169,7 +167,7 @@ class Robot:
 
     @property
     def hydrodynamic_coefficients(self) -> tuple[float, float, float, float, float, float]:
-        """(c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the six that are uncertain in practice."""
+        """(c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), which are uncertain in practice."""
         return (
             self.tangential_drag,
             self.normal_drag,

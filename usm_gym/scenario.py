@@ -46,8 +46,8 @@ class Path:
 class Inspection:
     """The joint motion: the head side of the body bends one way, the other way, and back.
 
-    A head deflection d is the reference d / bending_joints on each of the last joints, and turns the
-    head to -d.
+    A head deflection d is the reference d / bending_joints on each of the last joints, and turns
+    the head to -d.
 
     Attributes:
         bending_joints: How many joints bend, counted from the head.

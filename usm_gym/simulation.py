@@ -85,7 +85,7 @@ class Simulation:
     @property
     def time(self) -> NDArray[np.float64]:
         """Time since each start, s, (size,)."""
-        return self.count * self._timing[0]
+        return np.asarray(self.count * self._timing[0], np.float64)
 
     @property
     def limit(self) -> NDArray[np.float64]:
@@ -208,7 +208,7 @@ class Simulation:
         )
         self._fleet = Fleet(
             blocks=self._rows.reshape(len(self._rows), -1),
-            count=self.count,
+            instant=self.count,
             noise=self._noise,
             error=self.error,
             heading_error=self.heading_error,
@@ -275,4 +275,3 @@ class Simulation:
 
 
 _STATE = ("_rows", "count", "error", "heading_error", "observation", "max_error")
-

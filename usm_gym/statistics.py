@@ -9,7 +9,7 @@ RESAMPLES = 10_000
 
 
 def mean_interval(values: NDArray[np.float64]) -> tuple[float, tuple[float, float]]:
-    """Mean of the episodes and its 95 % percentile bootstrap interval, always the same for the same.
+    """Mean of the episodes and its 95 % percentile bootstrap interval, without randomness.
 
     Args:
         values: One value per episode, (episodes,).

@@ -1,0 +1,1 @@
+"""The physics: compiled functions of arrays, which know numpy and numba only."""

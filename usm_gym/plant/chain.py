@@ -1,8 +1,8 @@
 """Forward dynamics of the chain in O(links): docs/model.md section 5 derives what stands here.
 
-Both halves of the chain are eliminated from their free ends towards the root link in the middle, the
-root is solved, and the accelerations are substituted back towards the ends. Every quantity is a
-float64 or a `Lanes` (see `lanes`); `like` is a zero of that type.
+Both halves of the chain are eliminated from their free ends towards the root link in the middle,
+the root is solved, and the accelerations are substituted back towards the ends. Every quantity is
+a float64 or a `Lanes` (see `lanes`); `like` is a zero of that type.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.lanes import block_at, load, store
-from usm_gym.plant.layout import *  # noqa: F403  (the row names)
+from usm_gym.plant.layout import *
 
 
 class Body(NamedTuple):
@@ -116,10 +116,11 @@ def link_terms(block, like, record, base, body):
 def shifted(l, s, c, omega, answer):
     """Move a neighbour's answer by l along the link's tangent.
 
-    A neighbour that is accelerated at one point of a link (angular `alpha` of the link, linear `q` of
-    the point) answers with the moment r - a alpha - b . q and the force (r_x, r_y) - b alpha - C q.
-    Its `answer` is (a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y). Returned is the answer to the
-    acceleration of the new point, from which q = q_new - l alpha n + l omega^2 t follows.
+    A neighbour that is accelerated at one point of a link (angular `alpha` of the link, linear `q`
+    of the point) answers with the moment r - a alpha - b . q and the force
+    (r_x, r_y) - b alpha - C q. Its `answer` is (a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y).
+    Returned is the answer to the acceleration of the new point, from which
+    q = q_new - l alpha n + l omega^2 t follows.
     """
     a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
     centripetal = l * (omega * omega)
@@ -142,9 +143,7 @@ def eliminate(block, like, i, side, answer, base, body):
     reach = side * body.l
     record = HEADER + i * RECORD
     joint = record if side > 0.0 else record - RECORD
-    s, c, omega, f_t, f_n, moment, along, across, yaw = link_terms(
-        block, like, record, base, body
-    )
+    s, c, omega, f_t, f_n, moment, along, across, yaw = link_terms(block, like, record, base, body)
     a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = shifted(2.0 * reach, s, c, omega, answer)
     # The link itself, seen from its joint towards the root, reach t away from its centre.
     f_t -= reach * ((omega * omega) * along)
@@ -266,9 +265,7 @@ def accelerate(block, like, links, body):
         head = eliminate(block, like, last - i, -1.0, head, base, body)
     if 2 * root == links:
         tail = eliminate(block, like, root - 1, 1.0, tail, base, body)
-    alpha, q_x, q_y = solve_root(
-        block, like, root, tail, head, base, body
-    )
+    alpha, q_x, q_y = solve_root(block, like, root, tail, head, base, body)
     store(block, HEADER + root * RECORD + ALPHA, alpha)
     half_x, half_y = half_link(block, like, root, alpha, l)
     towards_tail = (alpha, q_x - half_x, q_y - half_y, q_x, q_y)

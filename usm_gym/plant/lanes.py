@@ -1,9 +1,9 @@
 """Numbers for several robots side by side: what turns a scalar kernel into a vector one.
 
 Inside kernels a quantity of the plant is either a float64, for one robot, or a `Lanes`, one number
-for each of `WIDTH` robots, held in vector registers. Arithmetic, `abs`, comparisons and `where` work
-alike on both, lane by lane, so that each equation is written once, as for one robot, and numba
-compiles it for either type. Every operation is the IEEE 754 one, and so are its bits.
+for each of `WIDTH` robots, held in vector registers. Arithmetic, `abs`, comparisons and `where`
+work alike on both, lane by lane, so that each equation is written once, as for one robot, and
+numba compiles it for either type. Every operation is the IEEE 754 one, and so are its bits.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numba.extending import intrinsic, lower_builtin, models, overload, register
 WIDTH = 8
 
 
-class LanesType(types.Type):  # type: ignore[misc]
+class LanesType(types.Type):
     """numba's name for a number per lane."""
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class LanesType(types.Type):  # type: ignore[misc]
         super().__init__(name=f"Lanes({WIDTH})")
 
 
-class MaskType(types.Type):  # type: ignore[misc]
+class MaskType(types.Type):
     """numba's name for a truth value per lane."""
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class MaskType(types.Type):  # type: ignore[misc]
         super().__init__(name=f"Mask({WIDTH})")
 
 
-class BlockType(types.Type):  # type: ignore[misc]
+class BlockType(types.Type):
     """numba's name for the address of a block's first number."""
 
     def __init__(self) -> None:
@@ -51,19 +51,19 @@ INTEGERS = ir.VectorType(ir.IntType(64), WIDTH)
 
 
 @register_model(LanesType)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, VECTOR)
 
 
 @register_model(MaskType)
-class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
+class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, ir.VectorType(ir.IntType(1), WIDTH))
 
 
 @register_model(BlockType)
-class _BlockModel(models.PrimitiveModel):  # type: ignore[misc]
+class _BlockModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, ir.DoubleType().as_pointer())
 
@@ -90,10 +90,8 @@ def _register(function: Any, result: Any, emit: Any) -> None:
     for scalar in (types.float64, types.int64):
         pairs += [(LANES, scalar), (scalar, LANES)]
 
-    class Template(ConcreteTemplate):  # type: ignore[misc]
-        cases = [signature(result, *pair) for pair in pairs]
-
-    infer_global(function)(Template)
+    cases = [signature(result, *pair) for pair in pairs]
+    infer_global(function)(type("Template", (ConcreteTemplate,), {"cases": cases}))
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         left, right = (
@@ -128,30 +126,36 @@ for _function, _sign in (
     _register(_function, MASK, _comparison(_sign))
 
 
-@infer_global(operator.neg)
-class _Negation(ConcreteTemplate):  # type: ignore[misc]
-    cases = [signature(LANES, LANES)]
+@overload(operator.neg)
+def _negation(value):
+    return (lambda value: _negate(value)) if value == LANES else None
 
 
-@lower_builtin(operator.neg, LANES)
-def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.fneg(args[0])
-
-
-@infer_global(abs)
-class _Size(ConcreteTemplate):  # type: ignore[misc]
-    cases = [signature(LANES, LANES)]
-
-
-@lower_builtin(abs, LANES)
-def _size(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    mask = ir.Constant(INTEGERS, [2**63 - 1] * WIDTH)
-    bits = builder.and_(builder.bitcast(args[0], INTEGERS), mask)
-    return builder.bitcast(bits, VECTOR)
+@overload(abs)
+def _size(value):
+    return (lambda value: _without_sign(value)) if value == LANES else None
 
 
 @intrinsic
-def _splat_lanes(typing_context, value):  # type: ignore[no-untyped-def]
+def _negate(typing_context, value):
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.fneg(args[0])
+
+    return LANES(LANES), emit
+
+
+@intrinsic
+def _without_sign(typing_context, value):
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        mask = ir.Constant(INTEGERS, [2**63 - 1] * WIDTH)
+        bits = builder.and_(builder.bitcast(args[0], INTEGERS), mask)
+        return builder.bitcast(bits, VECTOR)
+
+    return LANES(LANES), emit
+
+
+@intrinsic
+def _splat_lanes(typing_context, value):
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return _splat(builder, args[0])
 
@@ -159,7 +163,7 @@ def _splat_lanes(typing_context, value):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _select(typing_context, mask, yes, no):  # type: ignore[no-untyped-def]
+def _select(typing_context, mask, yes, no):
     lanes = LANES in (mask, yes, no) or mask == MASK
     result = LANES if lanes else types.float64
 
@@ -179,7 +183,7 @@ def _as_float(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 @intrinsic
-def _block(typing_context, blocks, k):  # type: ignore[no-untyped-def]
+def _block(typing_context, blocks, k):
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         array = context.make_array(sig.args[0])(context, builder, args[0])
         size = builder.extract_value(array.shape, 1)
@@ -189,7 +193,7 @@ def _block(typing_context, blocks, k):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _load(typing_context, block, row, like):  # type: ignore[no-untyped-def]
+def _load(typing_context, block, row, like):
     width, kind = (WIDTH, VECTOR) if like == LANES else (1, ir.DoubleType())
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -200,7 +204,7 @@ def _load(typing_context, block, row, like):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _store(typing_context, block, row, value):  # type: ignore[no-untyped-def]
+def _store(typing_context, block, row, value):
     width, kind = (WIDTH, VECTOR) if value == LANES else (1, ir.DoubleType())
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -241,25 +245,25 @@ def block_at(blocks: Any, k: Any) -> Any:
 
 
 @overload(where)
-def _where(mask, yes, no):  # type: ignore[no-untyped-def]
+def _where(mask, yes, no):
     return lambda mask, yes, no: _select(mask, yes, no)
 
 
 @overload(spread)
-def _spread_lanes(value):  # type: ignore[no-untyped-def]
+def _spread_lanes(value):
     return lambda value: _splat_lanes(value)
 
 
 @overload(load)
-def _load_row(block, row, like):  # type: ignore[no-untyped-def]
+def _load_row(block, row, like):
     return lambda block, row, like: _load(block, row, like)
 
 
 @overload(store)
-def _store_row(block, row, value):  # type: ignore[no-untyped-def]
+def _store_row(block, row, value):
     return lambda block, row, value: _store(block, row, value)
 
 
 @overload(block_at)
-def _block_of(blocks, k):  # type: ignore[no-untyped-def]
+def _block_of(blocks, k):
     return lambda blocks, k: _block(blocks, k)

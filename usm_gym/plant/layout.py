@@ -20,8 +20,8 @@ WATER_X, WATER_Y, WATER_AX, WATER_AY = range(13, 17)
 MEAN_X, MEAN_Y, AMPLITUDE_X, AMPLITUDE_Y, PHASE_X, PHASE_Y, WATER_FREQUENCY = range(17, 24)
 # Joint controller: gains, and the joint-space inertia that its implicit treatment adds.
 STIFFNESS, DAMPING, JOINT_INERTIA = range(24, 27)
-# Joint references: how many joints bend, the deflection they share and its rate; the filter over one
-# physics step (from deflection and rate, to deflection and rate) and what gives its acceleration.
+# Joint references: how many joints bend, the deflection they share, its rate and acceleration; the
+# filter over one physics step (deflection and rate, from either) and what gives the acceleration.
 BENDING_JOINTS, DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(27, 31)
 FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = range(31, 37)
 # Thrusters: share of the way to the command that one physics step covers, and the limit.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.plant.compile import piece
-from usm_gym.plant.layout import *  # noqa: F403  (the row names)
+from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
 
 # The quantities of an observation in order; `usm_gym.observation` says what they are.

@@ -53,7 +53,7 @@ def filter_coefficients(frequency, step):
 
 @compiled
 def lag_share(time_constant, step):
-    """Share of the way to its command that a thruster covers in one physics step, 1 - e^(-h/tau)."""
+    """Share of the way to its command that a thruster covers in a physics step, 1 - e^(-h/tau)."""
     if time_constant == 0.0:
         return 1.0
     return 1.0 - exp_of_negative(-step / time_constant)
@@ -61,5 +61,5 @@ def lag_share(time_constant, step):
 
 @piece
 def line_of_sight(distance, look_ahead):
-    """Heading reference psi_ref = -atan(distance / look_ahead), rad (section 5.1.1); 0 without one."""
+    """Heading reference -atan(distance / look_ahead), rad (section 5.1.1); 0 without a distance."""
     return -arctan(distance / look_ahead) if look_ahead > 0.0 else 0.0

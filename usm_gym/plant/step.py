@@ -15,8 +15,8 @@ from usm_gym.plant.chain import Body, accelerate
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
-from usm_gym.plant.layout import *  # noqa: F403  (the row names)
-from usm_gym.plant.measure import Table, command, measure
+from usm_gym.plant.layout import *
+from usm_gym.plant.measure import command, measure
 
 
 class Plant(NamedTuple):
@@ -48,7 +48,7 @@ class Fleet(NamedTuple):
 
     Attributes:
         blocks: All their numbers, see `layout`, shape (blocks, rows * lanes).
-        count: Control periods since the start, int64, (size,).
+        instant: Control periods since the start, int64, (size,).
         noise: Measurement errors of the position, m, (size, control instants, 2).
         error: True position errors, m, (size, 2).
         heading_error: Heading errors as known on board, rad, (size,).
@@ -56,7 +56,7 @@ class Fleet(NamedTuple):
     """
 
     blocks: NDArray[np.float64]
-    count: NDArray[np.int64]
+    instant: NDArray[np.int64]
     noise: NDArray[np.float64]
     error: NDArray[np.float64]
     heading_error: NDArray[np.float64]
@@ -186,7 +186,7 @@ def run(fleet, plant, table, actions, like, lanes, first, last):
             command(fleet.blocks[k], lanes, robot - k * lanes, plant.links, actions[robot])
         advance(block_at(fleet.blocks, k), like, plant)
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
-            fleet.count[robot] += 1
+            fleet.instant[robot] += 1
             observe(fleet, plant, table, robot, lanes)
 
 
@@ -199,7 +199,7 @@ def observe(fleet, plant, table, robot, lanes):
         robot % lanes,
         plant.links,
         plant.h,
-        fleet.noise[robot, fleet.count[robot]],
+        fleet.noise[robot, fleet.instant[robot]],
         table,
         fleet.error[robot],
         fleet.observation[robot],

@@ -1,0 +1,50 @@
+"""The `usm` command."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from agents.commands import evaluate, policies
+from agents.terminal import Parser
+from usm_gym import __version__
+from usm_gym.validation import in_one_line
+
+COMMANDS = (policies, evaluate)
+
+DESCRIPTION = """\
+Trajectory tracking for an underwater swimming manipulator: score controllers, compare them, train
+residual agents. A first look, in half a minute:
+
+  usm evaluate                 every policy on the fifty frozen operation scenarios
+  usm policies                 what there is to compare
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command and leave with its status: 2 for bad input, 130 for Ctrl-C."""
+    parser = Parser(
+        prog="usm",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"usm-gym {__version__}")
+    subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
+    for command in COMMANDS:
+        command.add_to(subparsers)
+    chosen = parser.parse_args(arguments)
+    try:
+        chosen.run(chosen)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        print("usm: interrupted", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader has gone; what is left in the buffer has nowhere to go.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except (ValueError, OSError) as error:
+        print(f"usm: error: {in_one_line(error)}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,180 @@
+"""The `usm` command as a user types it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+USM = Path(sys.executable).with_name("usm")
+
+
+def usm(*arguments, **options):
+    return subprocess.run(
+        [USM, *arguments], capture_output=True, text=True, check=False, timeout=300, **options
+    )
+
+
+def small_suite(folder, count=3):
+    import usm_gym
+
+    path = folder / "small.json"
+    scenarios = []
+    for scenario in usm_gym.suite("operation")[:count]:
+        data = scenario.to_dict()
+        data["duration"], data["settle_time"] = 4.0, 1.0
+        scenarios.append(data)
+    path.write_text(json.dumps({"scenarios": scenarios}))
+    return path
+
+
+def test_policies_lists_every_policy():
+    import baselines
+
+    answer = usm("policies")
+    assert answer.returncode == 0 and answer.stderr == ""
+    assert all(id in answer.stdout for id in baselines.ids())
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("evaluate", "--help"), ("policies", "--help")])
+def test_help_teaches(arguments):
+    answer = usm(*arguments)
+    assert answer.returncode == 0 and "usage: usm" in answer.stdout
+
+
+def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
+    output = tmp_path / "result.json"
+    answer = usm(
+        "evaluate", "--policies", "sta,pd", "--suite", small_suite(tmp_path), "--output", output
+    )
+    assert answer.returncode == 0
+    assert answer.stderr == ""  # no progress bar in a pipe
+    assert "sta" in answer.stdout and "pd" in answer.stdout
+    data = json.loads(output.read_text())
+    assert data["episodes"] == 3 and len(data["scenarios"]) == 3
+    assert set(data["results"]) == {"sta", "pd"}
+    row = data["results"]["sta"]
+    for key in (
+        "max_error_x",
+        "max_error_y",
+        "settled_error_x",
+        "settled_error_y",
+        "rms_error_x",
+        "rms_error_y",
+        "thrust_effort",
+        "thrust_variation",
+    ):
+        values = row["per_episode"][key]
+        assert len(values) == 3
+        assert row[key]["mean"] == pytest.approx(sum(values) / 3)
+        assert row[key]["worst"] == max(values)
+        assert row[key]["ci95"][0] <= row[key]["mean"] <= row[key]["ci95"][1]
+    assert row["failures"] == 0
+    assert {"version", "commit", "packages", "seeds", "command"} <= set(data["provenance"])
+    assert data["provenance"]["command"].startswith("usm evaluate --policies sta,pd")
+
+
+def test_results_do_not_depend_on_the_workers(tmp_path):
+    results = []
+    for workers in ("1", "2"):
+        output = tmp_path / f"{workers}.json"
+        answer = usm(
+            *("evaluate", "--policies", "sta,zero", "--suite", small_suite(tmp_path)),
+            *("--workers", workers, "--output", output),
+        )
+        assert answer.returncode == 0, answer.stderr
+        results.append(json.loads(output.read_text())["results"])
+    assert results[0] == results[1]
+
+
+def test_sampled_scenarios_come_from_the_seed(tmp_path):
+    def scenarios(*arguments):
+        output = tmp_path / "result.json"
+        answer = usm("evaluate", "--policies", "zero", *arguments, "--output", output)
+        assert answer.returncode == 0, answer.stderr
+        data = json.loads(output.read_text())
+        assert data["suite"] is None
+        return data["scenarios"]
+
+    first = scenarios("--seed", "3", "--episodes", "2")
+    assert scenarios("--seed", "3", "--episodes", "3")[:2] == first
+    assert scenarios("--seed", "4", "--episodes", "2") != first
+    assert scenarios("--seed", "3", "--episodes", "1", "--mode", "torpedo")[0]["mode"] == "torpedo"
+
+
+def test_conditions_override_the_suites_own_and_are_marked(tmp_path):
+    output = tmp_path / "result.json"
+    arguments = ("evaluate", "--policies", "zero", "--suite", small_suite(tmp_path), "--output")
+    usm(*arguments, output, "--conditions", "ideal")
+    data = json.loads(output.read_text())
+    assert data["conditions_override"] == "ideal"
+    assert {s["conditions"]["position_noise"] for s in data["scenarios"]} == {0.0}
+    usm(*arguments, output, "--conditions", '{"thruster_limit": 5.0}')
+    data = json.loads(output.read_text())
+    assert {s["conditions"]["thruster_limit"] for s in data["scenarios"]} == {5.0}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["evaluate", "--policies", "nobody"], "policy is 'nobody'; allowed: sta"),
+        (["evaluate", "--policies", ","], "--policies"),
+        (["evaluate", "--suite", "nowhere"], "suite is 'nowhere'; allowed: operation"),
+        (["evaluate", "--suite", "missing.json"], "missing.json"),
+        (["evaluate", "--conditions", "stormy"], "conditions is 'stormy'"),
+        (["evaluate", "--conditions", '{"noise": 1}'], "noise is 1"),
+        (["evaluate", "--conditions", '{"noise": '], "no JSON"),
+        (["evaluate", "--episodes", "0"], "--episodes is 0"),
+        (["evaluate", "--seed", "-1"], "--seed is -1"),
+        (["evaluate", "--workers", "0"], "workers is 0"),
+        (["evaluate", "--suite", "torpedo", "--seed", "1"], "--suite"),
+        (["evaluate", "--output", "missing/result.json"], "missing"),
+        (["evaluate", "--output", "."], "directory"),
+        (["evaluate", "--sweet"], "--sweet"),
+        (["evaluate", "--mode", "swim"], "swim"),
+        (["swim"], "swim"),
+        ([], "COMMAND"),
+    ],
+)
+def test_bad_input_gets_one_line_and_status_2(arguments, message, tmp_path):
+    answer = usm(*arguments, cwd=tmp_path)
+    assert answer.returncode == 2
+    assert answer.stdout == ""
+    assert answer.stderr.count("\n") == 1 and "error" in answer.stderr
+    assert message in answer.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "text", ["{", '{"scenarios": 3}', '{"scenarios": [{"mod": 1}]}', "[]", "\0"]
+)
+def test_a_broken_file_gets_one_line_and_status_2(text, tmp_path):
+    (tmp_path / "broken.json").write_text(text)
+    answer = usm("evaluate", "--suite", "broken.json", cwd=tmp_path)
+    assert answer.returncode == 2 and answer.stderr.count("\n") == 1
+
+
+def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
+    process = subprocess.Popen(
+        [USM, "evaluate", "--episodes", "3000", "--output", "result.json"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(5)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors == "usm: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_closed_pipe_leaves_no_traceback():
+    answer = subprocess.run(
+        f"{USM} policies | true", shell=True, capture_output=True, text=True, check=False
+    )
+    assert answer.stderr == ""

@@ -1,0 +1,54 @@
+"""Where a result comes from: versions, commit, command."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ("usm-gym", "gymnasium", "numpy", "numba", "scipy", "stable-baselines3", "torch")
+
+
+def provenance(seeds: Any) -> dict[str, Any]:
+    """Describe how a result was made.
+
+    Args:
+        seeds: The seeds it depends on, or what they came from.
+    """
+    packages = {name: known for name in PACKAGES if (known := _version(name)) is not None}
+    return {
+        "version": packages.get("usm-gym"),
+        "commit": _commit(),
+        "packages": {"python": platform.python_version(), **packages},
+        "seeds": seeds,
+        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _commit() -> str | None:
+    """Commit of the checkout that the package runs from; None where it runs from elsewhere."""
+    root = Path(__file__).resolve().parents[1]
+    if not (root / ".git").exists():
+        return None
+    try:
+        answer = subprocess.run(
+            ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.strip()
