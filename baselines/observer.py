@@ -11,13 +11,20 @@ import numpy as np
 
 from usm_gym.plant.compile import piece
 from usm_gym.plant.elementary import cube_root
+from usm_gym.validation import require
+
+
+def check_observer(L: float, k2_exponent: float) -> None:
+    """Refuse a gain of 0 and an exponent that is neither printed nor homogeneous."""
+    require(L > 0, "observer_gain", L, "a number > 0")
+    require(k2_exponent in (0.5, 2 / 3), "k2_exponent", k2_exponent, "0.5 or 2/3")
 
 
 @piece
 def observer_gains(L, k2_exponent):
     """(k1, k2, k3) = (6 L^(1/3), 11 L^k2_exponent, 6 L); the paper prints the exponent 1/2.
 
-    Homogeneity asks for the exponent 2/3, which is the only other one that is allowed.
+    Homogeneity asks for 2/3, the only other exponent that is allowed.
     """
     root = cube_root(L)
     k2 = 11.0 * (np.sqrt(L) if k2_exponent == 0.5 else root * root)

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from baselines.observer import observe, observer_gains
+from baselines.observer import check_observer, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
@@ -93,6 +93,7 @@ class PD(ScriptedPolicy):
     def __init__(self, nominal: Nominal, reading: Reading = "force", **gains: float) -> None:
         """Take gains other than the paper's by name, see `PDGains`."""
         super().__init__(nominal, PDGains(**gains))
+        check_observer(self.gains.observer_gain, self.gains.k2_exponent)
         require(reading in READINGS, "reading", reading, ", ".join(READINGS))
         self._reading = READINGS.index(reading)
 

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.observer import observe, observer_gains
+from baselines.observer import check_observer, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
-from usm_gym.validation import require
 
 
 class SuperTwistingGains(NamedTuple):
@@ -137,12 +136,7 @@ class SuperTwisting(ScriptedPolicy):
     def __init__(self, nominal: Nominal, implicit: bool = True, **gains: float) -> None:
         """Take gains other than the paper's by name, see `SuperTwistingGains`."""
         super().__init__(nominal, SuperTwistingGains(**gains))
-        require(
-            self.gains.k2_exponent in (0.5, 2 / 3),
-            "k2_exponent",
-            self.gains.k2_exponent,
-            "0.5 or 2/3",
-        )
+        check_observer(self.gains.observer_gain, self.gains.k2_exponent)
         self._implicit = implicit
 
     def force(self, signals: Signals, law_state: Array) -> Array:

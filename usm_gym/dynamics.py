@@ -54,14 +54,15 @@ def accelerations(
         " or ".join(map(repr, HYDRODYNAMICS)),
     )
     block = np.zeros(layout.rows(n, 0))
-    links = block[layout.HEADER :].reshape(n, layout.RECORD)
-    links[:, layout.THETA] = _vector("theta", theta, n)
-    links[:, layout.OMEGA] = _vector("theta_dot", theta_dot, n)
-    links[:-1, layout.TORQUE] = _vector("joint_torques", joint_torques, n - 1)
+    links = block[layout.HEADER :].reshape(layout.QUANTITIES, layout.padded(n))[:, :n]
+    links[layout.THETA] = _vector("theta", theta, n)
+    links[layout.OMEGA] = _vector("theta_dot", theta_dot, n)
+    links[layout.SIDE] = layout.sides(n)
+    links[layout.TORQUE, :-1] = _vector("joint_torques", joint_torques, n - 1)
     forces = _vector("thruster_forces", thruster_forces, len(robot.thrusters))
     normal = robot.thruster_is_normal
-    np.add.at(links[:, layout.PUSH_T], robot.thruster_links[~normal], forces[~normal])
-    np.add.at(links[:, layout.PUSH_N], robot.thruster_links[normal], forces[normal])
+    np.add.at(links[layout.PUSH_T], robot.thruster_links[~normal], forces[~normal])
+    np.add.at(links[layout.PUSH_N], robot.thruster_links[normal], forces[normal])
     block[layout.V_X : layout.V_Y + 1] = _vector("p_dot", p_dot, 2)
     block[layout.WATER_X : layout.WATER_Y + 1] = _vector("current", current, 2)
     block[layout.C_T : layout.LAMBDA_3 + 1] = robot.hydrodynamic_coefficients
@@ -73,7 +74,7 @@ def accelerations(
         kirchhoff=float(hydrodynamics == "consistent"),
     )
     accelerate_one(block[np.newaxis], n, body)
-    return links[:, layout.ALPHA].copy(), block[layout.A_X : layout.A_Y + 1].copy()
+    return links[layout.ALPHA].copy(), block[layout.A_X : layout.A_Y + 1].copy()
 
 
 def _vector(name: str, value: Any, size: int) -> NDArray[np.float64]:

@@ -228,23 +228,22 @@ def outcome(
     simulation: Simulation,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
     """Rewards, terminations and truncations of the step just made, (size,) each."""
-    lost = simulation.lost
     remaining = simulation.steps - simulation.count
-    rewards = reward(simulation.error, simulation.command, simulation.limit)
+    lost = simulation.lost
+    rewards = reward(simulation.error, simulation.effort, simulation.limit)
     if lost.any():
         rewards[lost] = reward_of_loss(remaining[lost])
-    return rewards, lost, (remaining <= 0) & ~lost
+    return rewards, lost.copy(), (remaining <= 0) & ~lost
 
 
 def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
-    """The info of every robot: arrays of shape (size,)."""
-    error, largest = np.nan_to_num(simulation.error), np.nan_to_num(simulation.max_error)
+    """The info of every robot: arrays of shape (size,), views of the simulation's."""
     return {
-        "error_x": error[:, 0],
-        "error_y": error[:, 1],
-        "max_error_x": largest[:, 0],
-        "max_error_y": largest[:, 1],
-        "heading_error": np.nan_to_num(simulation.heading_error),
-        "thrust_effort": np.abs(simulation.command).mean(axis=1),
+        "error_x": simulation.error[:, 0],
+        "error_y": simulation.error[:, 1],
+        "max_error_x": simulation.max_error[:, 0],
+        "max_error_y": simulation.max_error[:, 1],
+        "heading_error": simulation.heading_error,
+        "thrust_effort": simulation.effort,
         "diverged": simulation.lost.astype(np.int64),
     }

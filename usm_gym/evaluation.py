@@ -142,10 +142,9 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
     scenario, time, error = trajectory.scenario, trajectory.time, trajectory.error
     settle = scenario.settle_time
     if trajectory.lost:
-        known = error[np.isfinite(error).all(axis=1)]
-        largest = max(metrics.LOST_ERROR, float(np.abs(known).max(initial=0.0)))
+        largest = max(metrics.LOST_ERROR, float(np.abs(error).max()))
         row = dict.fromkeys(POSITION_METRICS, largest)
-        heading = np.abs(np.nan_to_num(trajectory.heading_error)).max()
+        heading = np.abs(trajectory.heading_error).max()
     else:
         values = np.concatenate(
             [

@@ -11,7 +11,7 @@ from usm_gym.validation import require
 
 # Controllers are given this long after each change of the joint references, s.
 RECOVERY = 7.0
-# What a lost episode counts at the least, m.
+# A robot further from its reference than this in either axis is lost, and counts as much at least, m.
 LOST_ERROR = 0.5
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.metrics import LOST_ERROR
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Body
@@ -19,9 +21,6 @@ from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.validation import require
-
-# A robot further from its reference than this, in either axis, is lost, m.
-LOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -53,6 +52,8 @@ class Simulation:
         heading_error: Heading errors as known on board, rad, (size,).
         observation: Observations, float32, (size, numbers).
         max_error: Largest true errors so far after settling, m, (size, 2); 0 before.
+        effort: Mean absolute thruster commands, N, (size,).
+        lost: Which robots are lost: further than `LOST_ERROR` from the reference, or not finite, (size,).
         steps: Control periods in each episode, int64, (size,).
     """
 
@@ -68,7 +69,6 @@ class Simulation:
         blocks = -(-self.size // self._lanes)
         numbers = rows.rows(robot.links, len(robot.thrusters))
         self._rows = np.zeros((blocks, numbers, self._lanes))
-        self._idle_lanes()
         self.scenarios = list(scenarios)
         self.count = np.zeros(self.size, np.int64)
         self.error = np.zeros((self.size, 2))
@@ -76,7 +76,9 @@ class Simulation:
         self.observation = np.zeros((self.size, self.layout.size), np.float32)
         self.max_error = np.zeros((self.size, 2))
         self.steps = np.zeros(self.size, np.int64)
-        self._settle_count = np.zeros(self.size, np.int64)
+        self.effort = np.zeros(self.size)
+        self.lost = np.zeros(self.size, bool)
+        self._settled = np.zeros(self.size, np.int64)
         self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, 2))
         self._share_out()
         for index, scenario in enumerate(scenarios):
@@ -95,23 +97,19 @@ class Simulation:
     @property
     def command(self) -> NDArray[np.float64]:
         """Last thruster commands after saturation, N, (size, thrusters)."""
-        return self._thrusters(rows.COMMAND)
+        first = rows.first_thruster(self.robot.links)
+        return self._columns(first, len(self.robot.thrusters))
 
     @property
     def theta(self) -> NDArray[np.float64]:
         """True link angles, rad, (size, links)."""
-        return self._links(rows.THETA)
+        links = self.robot.links
+        return self._columns(rows.HEADER + rows.THETA * rows.padded(links), links)
 
     @property
     def position(self) -> NDArray[np.float64]:
         """True position of the centre of mass, m, (size, 2)."""
         return np.stack([self._column(rows.P_X), self._column(rows.P_Y)], axis=1)
-
-    @property
-    def lost(self) -> NDArray[np.bool_]:
-        """Which robots are lost: further than `LOST` from the reference, or not finite, (size,)."""
-        near = (np.abs(self.error) <= LOST).all(axis=1)
-        return ~(near & np.isfinite(self.heading_error))
 
     def start(self, index: int, scenario: Scenario) -> None:
         """Put one robot at the beginning of a scenario.
@@ -138,9 +136,11 @@ class Simulation:
         self.count[index] = 0
         self.max_error[index] = 0.0
         self.steps[index] = scenario.steps
-        self._settle_count[index] = np.ceil(
+        self._settled[index] = math.ceil(
             scenario.settle_time / scenario.conditions.control_period - 1e-9
         )
+        self.effort[index] = 0.0
+        self.lost[index] = False
         noise = scenario.noise()
         if len(noise) > self._noise.shape[1]:
             longer = ((0, 0), (0, len(noise) - self._noise.shape[1]), (0, 0))
@@ -157,13 +157,11 @@ class Simulation:
                 [-1, 1] saturate.
         """
         self._kernel(self._fleet, self._plant, self._table, action, 0, len(self._rows))
-        settled = self.count >= self._settle_count
-        np.maximum(
-            self.max_error, np.abs(self.error), out=self.max_error, where=settled[:, np.newaxis]
-        )
-        lost = self.lost
-        if lost.any():
-            self._tidy(lost)
+        # Compiled code assumes finite numbers, so that what is none is found here.
+        distance = np.abs(self.error).max(axis=1) + 0.0 * self.heading_error
+        np.logical_not(distance <= LOST_ERROR, out=self.lost)
+        if self.lost.any():
+            self._tidy(self.lost)
 
     def snapshot(self) -> Snapshot:
         """Copy the whole state."""
@@ -181,10 +179,13 @@ class Simulation:
             getattr(self, name)[...] = array
 
     def _tidy(self, lost: NDArray[np.bool_]) -> None:
-        # A lost robot's observation is finite and inside its bounds all the same.
+        # What is reported of a lost robot is finite, its observation inside its bounds.
         bound = self.layout.bound
-        seen = np.nan_to_num(self.observation[lost], nan=0.0)
-        self.observation[lost] = np.clip(seen, -bound, bound)
+        self.observation[lost] = np.clip(np.nan_to_num(self.observation[lost]), -bound, bound)
+        for values in (self.error, self.max_error, self.heading_error):
+            values[lost] = np.nan_to_num(
+                values[lost], nan=LOST_ERROR, posinf=LOST_ERROR, neginf=-LOST_ERROR
+            )
 
     def _share_out(self) -> None:
         """Gather what the kernel takes; arrays are shared, not copied."""
@@ -210,8 +211,11 @@ class Simulation:
             blocks=self._rows.reshape(len(self._rows), -1),
             instant=self.count,
             noise=self._noise,
+            settled=self._settled,
             error=self.error,
+            max_error=self.max_error,
             heading_error=self.heading_error,
+            effort=self.effort,
             observation=self.observation,
         )
 
@@ -235,12 +239,15 @@ class Simulation:
         row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
         row[rows.JOINT_INERTIA] = implicit * k_d + implicit**2 * k_p
         motion = scenario.inspection
-        row[rows.BENDING_JOINTS] = motion.bending_joints
-        frequency = motion.filter_frequency
+        links, stride = self.robot.links, rows.padded(self.robot.links)
+        share = rows.HEADER + rows.SHARE * stride + links - 1 - motion.bending_joints
+        row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
+        side = rows.HEADER + rows.SIDE * stride
+        row[side : side + links] = rows.sides(links)
         row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(
-            np.inf if frequency is None else frequency, h
+            motion.filter_frequency or 0.0, h
         )
-        row[rows.SHIFT_TIME : rows.SHIFT_SIZE] = np.inf
+        row[rows.SHIFT_TIME : rows.SHIFT_SIZE] = rows.NEVER
         shifts = len(scenario.shifts)
         row[rows.SHIFT_TIME : rows.SHIFT_TIME + shifts] = scenario.shifts
         sizes = np.diff(motion.deflections, prepend=0.0)[:shifts]
@@ -253,25 +260,21 @@ class Simulation:
         row[rows.CROSS_TRACK] = scenario.cross_track
         row[rows.HEAD_HEADING] = scenario.heading == "head"
 
-    def _idle_lanes(self) -> None:
-        # Lanes that fill up the last block hold robots that rest: numbers, not zeros divided.
-        self._rows[:, rows.BENDING_JOINTS] = 1.0
-        self._rows[:, rows.LIMIT] = 1.0
-
     def _column(self, row: int) -> NDArray[np.float64]:
         return self._rows[:, row].reshape(-1)[: self.size]
 
-    def _links(self, row: int) -> NDArray[np.float64]:
-        first, last = rows.HEADER + row, rows.HEADER + self.robot.links * rows.RECORD
-        return self._table_of(slice(first, last, rows.RECORD))
-
-    def _thrusters(self, row: int) -> NDArray[np.float64]:
-        first = rows.HEADER + self.robot.links * rows.RECORD + row
-        return self._table_of(slice(first, None, rows.THRUSTER))
-
-    def _table_of(self, which: slice) -> NDArray[np.float64]:
-        table = self._rows[:, which].swapaxes(1, 2)
-        return table.reshape(-1, table.shape[2])[: self.size]
+    def _columns(self, first: int, count: int) -> NDArray[np.float64]:
+        table = self._rows[:, first : first + count].swapaxes(1, 2)
+        return table.reshape(-1, count)[: self.size]
 
 
-_STATE = ("_rows", "count", "error", "heading_error", "observation", "max_error")
+_STATE = (
+    "_rows",
+    "count",
+    "error",
+    "max_error",
+    "heading_error",
+    "effort",
+    "lost",
+    "observation",
+)

@@ -36,14 +36,16 @@ def test_policies_lists_every_policy():
     import baselines
 
     answer = usm("policies")
-    assert answer.returncode == 0 and answer.stderr == ""
+    assert answer.returncode == 0
+    assert answer.stderr == ""
     assert all(id in answer.stdout for id in baselines.ids())
 
 
 @pytest.mark.parametrize("arguments", [("--help",), ("evaluate", "--help"), ("policies", "--help")])
 def test_help_teaches(arguments):
     answer = usm(*arguments)
-    assert answer.returncode == 0 and "usage: usm" in answer.stdout
+    assert answer.returncode == 0
+    assert "usage: usm" in answer.stdout
 
 
 def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
@@ -53,9 +55,11 @@ def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
     )
     assert answer.returncode == 0
     assert answer.stderr == ""  # no progress bar in a pipe
-    assert "sta" in answer.stdout and "pd" in answer.stdout
+    assert "sta" in answer.stdout
+    assert "pd" in answer.stdout
     data = json.loads(output.read_text())
-    assert data["episodes"] == 3 and len(data["scenarios"]) == 3
+    assert data["episodes"] == 3
+    assert len(data["scenarios"]) == 3
     assert set(data["results"]) == {"sta", "pd"}
     row = data["results"]["sta"]
     for key in (
@@ -144,7 +148,8 @@ def test_bad_input_gets_one_line_and_status_2(arguments, message, tmp_path):
     answer = usm(*arguments, cwd=tmp_path)
     assert answer.returncode == 2
     assert answer.stdout == ""
-    assert answer.stderr.count("\n") == 1 and "error" in answer.stderr
+    assert answer.stderr.count("\n") == 1
+    assert "error" in answer.stderr
     assert message in answer.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -155,7 +160,8 @@ def test_bad_input_gets_one_line_and_status_2(arguments, message, tmp_path):
 def test_a_broken_file_gets_one_line_and_status_2(text, tmp_path):
     (tmp_path / "broken.json").write_text(text)
     answer = usm("evaluate", "--suite", "broken.json", cwd=tmp_path)
-    assert answer.returncode == 2 and answer.stderr.count("\n") == 1
+    assert answer.returncode == 2
+    assert answer.stderr.count("\n") == 1
 
 
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):

@@ -38,7 +38,8 @@ def test_a_zero_residual_is_the_base_to_the_bit(base):
         action, state = policy.predict(observation, state)
         observation, reward, *_, info = plain.step(action)
         seen, its_reward, *_, its_info = residual.step(np.zeros(5, np.float32))
-        assert (seen[:90] == observation).all() and its_reward == reward
+        assert (seen[:90] == observation).all()
+        assert its_reward == reward
     assert its_info == info
 
 

@@ -87,7 +87,7 @@ def test_observation_is_what_the_table_says():
     acceleration = [0.0, -slope * path.frequency * np.sin(phase)]
     reference = np.array([path.speed * s, path.amplitude * np.sin(phase)])
     error = simulation.position[0] - reference
-    close = dict(rtol=2e-7, atol=1e-9)
+    close = {"rtol": 2e-7, "atol": 1e-9}
     np.testing.assert_allclose(seen["position_error"], error, **close)
     np.testing.assert_allclose([info["error_x"], info["error_y"]], error, atol=1e-15)
     np.testing.assert_allclose(seen["reference_velocity"], velocity, **close)
@@ -105,7 +105,9 @@ def test_observation_is_what_the_table_says():
 def test_equal_seeds_give_equal_bits_and_others_do_not():
     first, second, third = (rollout(gym.make("USM-Operation-v0"), 300, seed) for seed in (7, 7, 8))
     for (a, r, i), (b, s, j) in zip(first, second, strict=True):
-        assert (a == b).all() and r == s and i == j
+        assert (a == b).all()
+        assert r == s
+        assert i == j
     assert (first[-1][0] != third[-1][0]).any()
 
 
@@ -143,7 +145,8 @@ def test_snapshot_and_restore_repeat_the_same_bits():
     env.unwrapped.restore(snapshot)
     second = [env.step(action) for action in actions[100:]]
     for a, b in zip(first, second, strict=True):
-        assert (a[0] == b[0]).all() and a[1:] == b[1:]
+        assert (a[0] == b[0]).all()
+        assert a[1:] == b[1:]
 
 
 def test_a_lost_robot_ends_the_episode_with_a_finite_observation_and_the_bill():
@@ -155,7 +158,9 @@ def test_a_lost_robot_ends_the_episode_with_a_finite_observation_and_the_bill():
         rewards.append(reward)
         if terminated or truncated:
             break
-    assert terminated and not truncated and info["diverged"] == 1
+    assert terminated
+    assert not truncated
+    assert info["diverged"] == 1
     assert max(abs(info["error_x"]), abs(info["error_y"])) > 0.5
     assert env.observation_space.contains(observation)
     # Lost in step k, it is charged 10.1 for that step and for each of the 2000 - k that remain.
@@ -171,8 +176,10 @@ def test_a_state_that_is_not_finite_is_reported():
             observation, _, terminated, _, info = env.step(np.ones(5, np.float32))
             if terminated:
                 break
-    assert terminated and info["diverged"] == 1
-    assert np.isfinite(observation).all() and np.isfinite(list(info.values())).all()
+    assert terminated
+    assert info["diverged"] == 1
+    assert np.isfinite(observation).all()
+    assert np.isfinite(list(info.values())).all()
 
 
 @pytest.mark.parametrize(
@@ -196,7 +203,8 @@ def test_actions_beyond_the_bounds_saturate():
         env = gym.make("USM-Operation-v0")
         env.reset(seed=0)
         outcomes.append(env.step(np.full(5, size, np.float32)))
-    assert (outcomes[0][0] == outcomes[1][0]).all() and (outcomes[0][0] == outcomes[2][0]).all()
+    assert (outcomes[0][0] == outcomes[1][0]).all()
+    assert (outcomes[0][0] == outcomes[2][0]).all()
     assert outcomes[0][4]["thrust_effort"] == 20.0
 
 

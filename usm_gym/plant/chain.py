@@ -1,8 +1,13 @@
 """Forward dynamics of the chain in O(links): docs/model.md section 5 derives what stands here.
 
-Both halves of the chain are eliminated from their free ends towards the root link in the middle,
-the root is solved, and the accelerations are substituted back towards the ends. Every quantity is
-a float64 or a `Lanes` (see `lanes`); `like` is a zero of that type.
+First, for every link by itself, its own answer to an acceleration; then both halves of the chain
+are eliminated from their free ends towards the root link in the middle, the root is solved, and the
+accelerations are substituted back towards the ends.
+
+Every quantity is a float64 or a `Lanes` (see `lanes`). `like` is a zero of the type that a number
+of the header has: float64 in a block of one robot, `Lanes` in one of several. `wide` is a zero of
+the type in which links are worked on that do not depend on each other: always a `Lanes`, of
+`stride` links of one robot, or of one link of several.
 """
 
 from __future__ import annotations
@@ -11,7 +16,7 @@ from typing import NamedTuple
 
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import sincos
-from usm_gym.plant.lanes import block_at, load, store
+from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store
 from usm_gym.plant.layout import *
 
 
@@ -34,59 +39,42 @@ class Body(NamedTuple):
 
 
 @piece
-def fluid_force(block, like, v_t, v_n, omega, water_t, kirchhoff):
-    """Force along and across a link and moment on it from the water, without -mu_n (n . a).
-
-    Arguments are the link's velocity relative to the water, its rate, and the water's own velocity
-    along the link. The added mass of Kelasidi et al. (2014) leaves out the Munk moment
-    (docs/model.md section 3).
-    """
-    mu = load(block, MU, like)
-    consistent = mu * kirchhoff
-    published = mu - consistent
-    f_t = consistent * (v_n * omega) - load(block, C_T, like) * (v_t + v_t * abs(v_t))
-    f_n = (consistent * v_t - published * water_t) * omega - load(block, C_N, like) * (
-        v_n + v_n * abs(v_n)
-    )
-    yaw_drag = load(block, LAMBDA_2, like) + load(block, LAMBDA_3, like) * abs(omega)
-    moment = -yaw_drag * omega - consistent * (v_t * v_n)
-    return f_t, f_n, moment
+def row_of(quantity, links):
+    """First row of a quantity of the links."""
+    return HEADER + quantity * padded_rows(links)
 
 
 @piece
-def inertia(block, like, v_t, v_n, omega, body):
-    """Inertia of a link along, across and in yaw; implicit drag adds h times its slope."""
-    h = body.h
-    along = body.m + h * (load(block, C_T, like) * (1.0 + 2.0 * abs(v_t)))
-    across = body.m + load(block, MU, like) + h * (load(block, C_N, like) * (1.0 + 2.0 * abs(v_n)))
-    yaw_slope = load(block, LAMBDA_2, like) + 2.0 * load(block, LAMBDA_3, like) * abs(omega)
-    return along, across, body.J + load(block, LAMBDA_1, like) + h * yaw_slope
+def padded_rows(links):
+    """`layout.padded`, for kernels."""
+    return (links + WIDTH - 1) // WIDTH * WIDTH
 
 
 @piece
-def kinematics(block, like, links, l):
-    """Sine and cosine of every angle, and every link's velocity relative to the water.
+def kinematics(block, like, wide, stride, links, l):
+    """Sine and cosine of every angle, and every link's velocity relative to the tail end.
 
     Returns:
-        What has to be added to the velocities U_X, U_Y, which are those relative to the tail end.
+        What has to be added to the velocities U_X, U_Y to make them relative to the water.
     """
+    theta, omega = row_of(THETA, links), row_of(OMEGA, links)
+    sine, cosine = row_of(SIN, links), row_of(COS, links)
+    u_x, u_y = row_of(U_X, links), row_of(U_Y, links)
+    for i in range(0, links, stride):
+        s, c = sincos(load(block, theta + i, wide))
+        speed = l * load(block, omega + i, wide)
+        store(block, sine + i, s)
+        store(block, cosine + i, c)
+        store(block, u_x + i, -speed * s)
+        store(block, u_y + i, speed * c)
     run_x, run_y, sum_x, sum_y = like, like, like, like
     for i in range(links):
-        record = HEADER + i * RECORD
-        s, c = sincos(load(block, record + THETA, like))
-        speed = l * load(block, record + OMEGA, like)
-        half_x = -speed * s
-        half_y = speed * c
-        store(block, record + SIN, s)
-        store(block, record + COS, c)
-        centre_x = run_x + half_x
-        centre_y = run_y + half_y
-        store(block, record + U_X, centre_x)
-        store(block, record + U_Y, centre_y)
-        run_x = centre_x + half_x
-        run_y = centre_y + half_y
-        sum_x += centre_x
-        sum_y += centre_y
+        half_x, half_y = load(block, u_x + i, like), load(block, u_y + i, like)
+        centre_x, centre_y = run_x + half_x, run_y + half_y
+        store(block, u_x + i, centre_x)
+        store(block, u_y + i, centre_y)
+        run_x, run_y = run_x + 2.0 * half_x, run_y + 2.0 * half_y
+        sum_x, sum_y = sum_x + centre_x, sum_y + centre_y
     share = 1.0 / links
     return (
         load(block, V_X, like) - load(block, WATER_X, like) - share * sum_x,
@@ -95,32 +83,113 @@ def kinematics(block, like, links, l):
 
 
 @piece
-def link_terms(block, like, record, base, body):
-    """What one link brings: (sin, cos, omega, f_t, f_n, moment, M_t, M_n, I)."""
-    s = load(block, record + SIN, like)
-    c = load(block, record + COS, like)
-    omega = load(block, record + OMEGA, like)
-    u_x = base[0] + load(block, record + U_X, like)
-    u_y = base[1] + load(block, record + U_Y, like)
-    v_t = c * u_x + s * u_y
-    v_n = c * u_y - s * u_x
-    water_t = c * load(block, WATER_X, like) + s * load(block, WATER_Y, like)
-    f_t, f_n, moment = fluid_force(block, like, v_t, v_n, omega, water_t, body.kirchhoff)
-    along, across, yaw = inertia(block, like, v_t, v_n, omega, body)
-    f_t += load(block, record + PUSH_T, like)
-    f_n += load(block, record + PUSH_N, like)
-    return s, c, omega, f_t, f_n, moment, along, across, yaw
+def fluid_force(v_t, v_n, omega, water_t, coefficients, kirchhoff):
+    """Force along and across a link and moment on it from the water, without -mu_n (n . a).
+
+    Arguments are the link's velocity relative to the water, its rate, and the water's own velocity
+    along the link. The added mass of Kelasidi et al. (2014) leaves out the Munk moment
+    (docs/model.md section 3).
+    """
+    c_t, c_n, mu, _, lambda_2, lambda_3 = coefficients
+    consistent = mu * kirchhoff
+    published = mu - consistent
+    f_t = consistent * (v_n * omega) - c_t * (v_t + v_t * abs(v_t))
+    f_n = (consistent * v_t - published * water_t) * omega - c_n * (v_n + v_n * abs(v_n))
+    moment = -(lambda_2 + lambda_3 * abs(omega)) * omega - consistent * (v_t * v_n)
+    return f_t, f_n, moment
+
+
+@piece
+def inertia(v_t, v_n, omega, coefficients, body):
+    """Inertia of a link along, across and in yaw; implicit drag adds h times its slope."""
+    c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
+    along = body.m + body.h * (c_t * (1.0 + 2.0 * abs(v_t)))
+    across = body.m + mu + body.h * (c_n * (1.0 + 2.0 * abs(v_n)))
+    yaw = body.J + lambda_1 + body.h * (lambda_2 + 2.0 * lambda_3 * abs(omega))
+    return along, across, yaw
+
+
+@piece
+def own_answers(block, like, wide, stride, links, base, body):
+    """Every link's own answer to an acceleration of its end towards the root (root: its centre).
+
+    An answer is (a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y): to the angular acceleration `alpha`
+    of the link and the linear acceleration q of the point it gives the moment r - a alpha - b . q
+    and the force (r_x, r_y) - b alpha - C q.
+    """
+    rows = padded_rows(links)
+    own = row_of(OWN, links)
+    coefficients = (
+        load(block, C_T, like),
+        load(block, C_N, like),
+        load(block, MU, like),
+        load(block, LAMBDA_1, like),
+        load(block, LAMBDA_2, like),
+        load(block, LAMBDA_3, like),
+    )
+    water_x, water_y = load(block, WATER_X, like), load(block, WATER_Y, like)
+    for i in range(0, links, stride):
+        s = load(block, row_of(SIN, links) + i, wide)
+        c = load(block, row_of(COS, links) + i, wide)
+        omega = load(block, row_of(OMEGA, links) + i, wide)
+        u_x = base[0] + load(block, row_of(U_X, links) + i, wide)
+        u_y = base[1] + load(block, row_of(U_Y, links) + i, wide)
+        v_t = c * u_x + s * u_y
+        v_n = c * u_y - s * u_x
+        water_t = c * water_x + s * water_y
+        f_t, f_n, moment = fluid_force(v_t, v_n, omega, water_t, coefficients, body.kirchhoff)
+        along, across, yaw = inertia(v_t, v_n, omega, coefficients, body)
+        # The point is reach t from the centre, which moves with q - reach (alpha n - omega^2 t).
+        reach = body.l * load(block, row_of(SIDE, links) + i, wide)
+        f_t += load(block, row_of(PUSH_T, links) + i, wide) - reach * ((omega * omega) * along)
+        f_n += load(block, row_of(PUSH_N, links) + i, wide)
+        lever = reach * across
+        difference = along - across
+        store(block, own + i, yaw + reach * lever)
+        store(block, own + rows + i, lever * s)
+        store(block, own + 2 * rows + i, -lever * c)
+        store(block, own + 3 * rows + i, across + difference * (c * c))
+        store(block, own + 4 * rows + i, difference * (c * s))
+        store(block, own + 5 * rows + i, across + difference * (s * s))
+        store(block, own + 6 * rows + i, moment - reach * f_n)
+        store(block, own + 7 * rows + i, f_t * c - f_n * s)
+        store(block, own + 8 * rows + i, f_t * s + f_n * c)
+
+
+@piece
+def axes(block, like, i, links):
+    """(sin, cos, omega) of link i."""
+    return (
+        load(block, row_of(SIN, links) + i, like),
+        load(block, row_of(COS, links) + i, like),
+        load(block, row_of(OMEGA, links) + i, like),
+    )
+
+
+@piece
+def with_own(block, like, i, links, answer):
+    """The sum of an answer and link i's own."""
+    rows = padded_rows(links)
+    own = row_of(OWN, links) + i
+    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
+    return (
+        a + load(block, own, like),
+        b_x + load(block, own + rows, like),
+        b_y + load(block, own + 2 * rows, like),
+        c_xx + load(block, own + 3 * rows, like),
+        c_xy + load(block, own + 4 * rows, like),
+        c_yy + load(block, own + 5 * rows, like),
+        r + load(block, own + 6 * rows, like),
+        r_x + load(block, own + 7 * rows, like),
+        r_y + load(block, own + 8 * rows, like),
+    )
 
 
 @piece
 def shifted(l, s, c, omega, answer):
-    """Move a neighbour's answer by l along the link's tangent.
+    """Move a neighbour's answer by l along the tangent of a link.
 
-    A neighbour that is accelerated at one point of a link (angular `alpha` of the link, linear `q`
-    of the point) answers with the moment r - a alpha - b . q and the force
-    (r_x, r_y) - b alpha - C q. Its `answer` is (a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y).
-    Returned is the answer to the acceleration of the new point, from which
-    q = q_new - l alpha n + l omega^2 t follows.
+    q = q_new - l alpha n + l omega^2 t makes it an answer to the acceleration of the new point.
     """
     a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
     centripetal = l * (omega * omega)
@@ -135,41 +204,29 @@ def shifted(l, s, c, omega, answer):
 
 
 @piece
-def eliminate(block, like, i, side, answer, base, body):
+def eliminate(block, like, i, side, links, l, answer):
     """Eliminate link i: from the answer of the links beyond it, make the answer that includes it.
 
-    `side` is +1.0 for a link between tail and root, -1.0 for one between root and head.
+    `side` is 1.0 for a link between tail and root, -1.0 for one between root and head.
     """
-    reach = side * body.l
-    record = HEADER + i * RECORD
-    joint = record if side > 0.0 else record - RECORD
-    s, c, omega, f_t, f_n, moment, along, across, yaw = link_terms(block, like, record, base, body)
-    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = shifted(2.0 * reach, s, c, omega, answer)
-    # The link itself, seen from its joint towards the root, reach t away from its centre.
-    f_t -= reach * ((omega * omega) * along)
-    lever = reach * across
-    difference = along - across
-    a += yaw + reach * lever
-    b_x += lever * s
-    b_y -= lever * c
-    c_xx += across + difference * (c * c)
-    c_xy += difference * (c * s)
-    c_yy += across + difference * (s * s)
-    r += moment - reach * f_n
-    r_x += f_t * c - f_n * s
-    r_y += f_t * s + f_n * c
+    rows = padded_rows(links)
+    sub = row_of(SUB_0, links) + i
+    joint = row_of(TORQUE, links) + (i if side > 0.0 else i - 1)
+    s, c, omega = axes(block, like, i, links)
+    answer = with_own(block, like, i, links, shifted(2.0 * side * l, s, c, omega, answer))
+    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
     # The joint's torque is u - k (alpha - alpha_next), k from its implicit treatment.
     k = load(block, JOINT_INERTIA, like)
-    u = side * load(block, joint + TORQUE, like)
+    u = side * load(block, joint, like)
     inverse = 1.0 / (a + k)
     sub_0 = (r + u) * inverse
     sub_k = k * inverse
     sub_x = b_x * inverse
     sub_y = b_y * inverse
-    store(block, record + SUB_0, sub_0)
-    store(block, record + SUB_K, sub_k)
-    store(block, record + SUB_X, sub_x)
-    store(block, record + SUB_Y, sub_y)
+    store(block, sub, sub_0)
+    store(block, sub + rows, sub_k)
+    store(block, sub + 2 * rows, sub_x)
+    store(block, sub + 3 * rows, sub_y)
     return (
         a * sub_k,
         b_x * sub_k,
@@ -184,24 +241,20 @@ def eliminate(block, like, i, side, answer, base, body):
 
 
 @piece
-def solve_root(block, like, root, tail, head, base, body):
+def solve_root(block, like, root, links, l, tail, head):
     """Solve the root link: (alpha, q_x, q_y) of its centre."""
-    l = body.l
-    s, c, omega, f_t, f_n, moment, along, across, yaw = link_terms(
-        block, like, HEADER + root * RECORD, base, body
-    )
+    s, c, omega = axes(block, like, root, links)
     a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = shifted(l, s, c, omega, tail)
-    a_h, b_xh, b_yh, c_xxh, c_xyh, c_yyh, r_h, r_xh, r_yh = shifted(-l, s, c, omega, head)
-    difference = along - across
-    a += a_h + yaw
-    b_x += b_xh
-    b_y += b_yh
-    c_xx += c_xxh + (across + difference * (c * c))
-    c_xy += c_xyh + difference * (c * s)
-    c_yy += c_yyh + (across + difference * (s * s))
-    r += r_h + moment
-    r_x += r_xh + (f_t * c - f_n * s)
-    r_y += r_yh + (f_t * s + f_n * c)
+    answer = with_own(block, like, root, links, shifted(-l, s, c, omega, head))
+    a += answer[0]
+    b_x += answer[1]
+    b_y += answer[2]
+    c_xx += answer[3]
+    c_xy += answer[4]
+    c_yy += answer[5]
+    r += answer[6]
+    r_x += answer[7]
+    r_y += answer[8]
     inverse = 1.0 / a
     c_xx -= b_x * b_x * inverse
     c_xy -= b_x * b_y * inverse
@@ -215,40 +268,38 @@ def solve_root(block, like, root, tail, head, base, body):
 
 
 @piece
-def half_link(block, like, i, alpha, l):
+def half_link(block, like, i, links, alpha, l):
     """Acceleration of link i's head end relative to its centre: l (alpha n - omega^2 t)."""
-    record = HEADER + i * RECORD
-    s = load(block, record + SIN, like)
-    c = load(block, record + COS, like)
-    omega = load(block, record + OMEGA, like)
+    s, c, omega = axes(block, like, i, links)
     square = omega * omega
     return -l * (alpha * s + square * c), l * (alpha * c - square * s)
 
 
 @piece
-def substitute(block, like, i, side, motion, l):
+def substitute(block, like, i, side, links, l, motion):
     """Find a link's motion from that of its neighbour towards the root.
 
     `motion` is (alpha of the neighbour, acceleration q of the joint between the two, sum of the
     accelerations of all link centres so far); returned is the same for the next link.
     """
-    record = HEADER + i * RECORD
+    rows = padded_rows(links)
+    sub = row_of(SUB_0, links) + i
     alpha, q_x, q_y, sum_x, sum_y = motion
     alpha = (
-        load(block, record + SUB_0, like)
-        + load(block, record + SUB_K, like) * alpha
-        - load(block, record + SUB_X, like) * q_x
-        - load(block, record + SUB_Y, like) * q_y
+        load(block, sub, like)
+        + load(block, sub + rows, like) * alpha
+        - load(block, sub + 2 * rows, like) * q_x
+        - load(block, sub + 3 * rows, like) * q_y
     )
-    store(block, record + ALPHA, alpha)
-    half_x, half_y = half_link(block, like, i, alpha, side * l)
+    store(block, row_of(ALPHA, links) + i, alpha)
+    half_x, half_y = half_link(block, like, i, links, alpha, side * l)
     centre_x = q_x - half_x
     centre_y = q_y - half_y
     return alpha, centre_x - half_x, centre_y - half_y, sum_x + centre_x, sum_y + centre_y
 
 
 @piece
-def accelerate(block, like, links, body):
+def accelerate(block, like, wide, stride, links, body):
     """Fill in ALPHA of every link and the acceleration A_X, A_Y of the centre of mass.
 
     A neutrally buoyant robot does not notice that all the water accelerates: relative to the water
@@ -257,24 +308,25 @@ def accelerate(block, like, links, body):
     l = body.l
     root = links // 2
     last = links - 1
-    base = kinematics(block, like, links, l)
+    base = kinematics(block, like, wide, stride, links, l)
+    own_answers(block, like, wide, stride, links, base, body)
     tail = (like, like, like, like, like, like, like, like, like)
     head = tail
     for i in range(last - root):
-        tail = eliminate(block, like, i, 1.0, tail, base, body)
-        head = eliminate(block, like, last - i, -1.0, head, base, body)
+        tail = eliminate(block, like, i, 1.0, links, l, tail)
+        head = eliminate(block, like, last - i, -1.0, links, l, head)
     if 2 * root == links:
-        tail = eliminate(block, like, root - 1, 1.0, tail, base, body)
-    alpha, q_x, q_y = solve_root(block, like, root, tail, head, base, body)
-    store(block, HEADER + root * RECORD + ALPHA, alpha)
-    half_x, half_y = half_link(block, like, root, alpha, l)
+        tail = eliminate(block, like, root - 1, 1.0, links, l, tail)
+    alpha, q_x, q_y = solve_root(block, like, root, links, l, tail, head)
+    store(block, row_of(ALPHA, links) + root, alpha)
+    half_x, half_y = half_link(block, like, root, links, alpha, l)
     towards_tail = (alpha, q_x - half_x, q_y - half_y, q_x, q_y)
     towards_head = (alpha, q_x + half_x, q_y + half_y, like, like)
     if 2 * root == links:
-        towards_tail = substitute(block, like, root - 1, 1.0, towards_tail, l)
+        towards_tail = substitute(block, like, root - 1, 1.0, links, l, towards_tail)
     for i in range(last - root - 1, -1, -1):
-        towards_tail = substitute(block, like, i, 1.0, towards_tail, l)
-        towards_head = substitute(block, like, last - i, -1.0, towards_head, l)
+        towards_tail = substitute(block, like, i, 1.0, links, l, towards_tail)
+        towards_head = substitute(block, like, last - i, -1.0, links, l, towards_head)
     share = 1.0 / links
     store(block, A_X, share * (towards_tail[3] + towards_head[3]) + load(block, WATER_AX, like))
     store(block, A_Y, share * (towards_tail[4] + towards_head[4]) + load(block, WATER_AY, like))
@@ -283,4 +335,4 @@ def accelerate(block, like, links, body):
 @compiled
 def accelerate_one(blocks, links, body):
     """`accelerate` for the first of the blocks of one robot each."""
-    accelerate(block_at(blocks, 0), 0.0, links, body)
+    accelerate(block_at(blocks, 0, 0.0), 0.0, spread(0.0), WIDTH, links, body)

@@ -50,7 +50,7 @@ def compiled(function: F) -> F:
 
 def piece(function: F) -> F:
     """Compile a part of kernels, for use within `compiled` functions only."""
-    part: F = numba.njit(fastmath=FLAGS, error_model="numpy")(function)
+    part: F = numba.njit(fastmath=FLAGS, error_model="numpy", forceinline=True)(function)
     return part
 
 

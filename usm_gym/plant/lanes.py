@@ -36,16 +36,16 @@ class MaskType(types.Type):
 
 
 class BlockType(types.Type):
-    """numba's name for the address of a block's first number."""
+    """numba's name for the address of a block whose rows have `width` numbers."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: int) -> None:
         """Name the type."""
-        super().__init__(name="Block")
+        self.width = width
+        super().__init__(name=f"Block({width})")
 
 
 LANES = LanesType()
 MASK = MaskType()
-BLOCK = BlockType()
 VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 INTEGERS = ir.VectorType(ir.IntType(64), WIDTH)
 
@@ -183,40 +183,46 @@ def _as_float(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 @intrinsic
-def _block(typing_context, blocks, k):
+def _block(typing_context, blocks, k, like):
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         array = context.make_array(sig.args[0])(context, builder, args[0])
         size = builder.extract_value(array.shape, 1)
         return builder.gep(array.data, [builder.mul(args[1], size)])
 
-    return BLOCK(blocks, types.intp), emit
+    return BlockType(_width(like))(blocks, types.intp, like), emit
 
 
 @intrinsic
 def _load(typing_context, block, row, like):
-    width, kind = (WIDTH, VECTOR) if like == LANES else (1, ir.DoubleType())
+    kind = VECTOR if like == LANES else ir.DoubleType()
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        address = _address(builder, args[0], args[1], width, kind)
+        address = _address(builder, block.width, args[0], args[1], kind)
         return builder.load(address, align=8, typ=kind)
 
-    return like(BLOCK, types.intp, like), emit
+    return like(block, types.intp, like), emit
 
 
 @intrinsic
 def _store(typing_context, block, row, value):
-    width, kind = (WIDTH, VECTOR) if value == LANES else (1, ir.DoubleType())
+    lanes = value == LANES or block.width == WIDTH
+    kind, convert = (VECTOR, _as_vector) if lanes else (ir.DoubleType(), _as_float)
 
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        builder.store(args[2], _address(builder, args[0], args[1], width, kind), align=8)
+        address = _address(builder, block.width, args[0], args[1], kind)
+        builder.store(convert(context, builder, value, args[2]), address, align=8)
         return context.get_dummy_value()
 
-    return types.none(BLOCK, types.intp, value), emit
+    return types.none(block, types.intp, value), emit
 
 
-def _address(builder: Any, block: Any, row: Any, width: int, kind: Any) -> Any:
+def _address(builder: Any, width: int, block: Any, row: Any, kind: Any) -> Any:
     offset = builder.mul(row, ir.Constant(row.type, width))
     return builder.bitcast(builder.gep(block, [offset]), kind.as_pointer())
+
+
+def _width(kind: Any) -> int:
+    return WIDTH if kind == LANES else 1
 
 
 def where(mask: Any, yes: Any, no: Any) -> Any:
@@ -230,17 +236,23 @@ def spread(value: Any) -> Any:
 
 
 def load(block: Any, row: Any, like: Any) -> Any:
-    """Row `row` of a block, of the type of `like`; for kernels only."""
+    """Row `row` of a block, of the type of `like`; for kernels only.
+
+    From a block of one robot, a `Lanes` is as many rows that follow each other.
+    """
     raise NotImplementedError
 
 
 def store(block: Any, row: Any, value: Any) -> Any:
-    """Write row `row` of a block; for kernels only."""
+    """Write row `row` of a block, as `load` reads it; for kernels only."""
     raise NotImplementedError
 
 
-def block_at(blocks: Any, k: Any) -> Any:
-    """Block `k` of an array of shape (blocks, numbers of a block); for kernels only."""
+def block_at(blocks: Any, k: Any, like: Any) -> Any:
+    """Block `k` of an array of shape (blocks, numbers of a block); for kernels only.
+
+    Its rows hold `WIDTH` numbers if `like` is a `Lanes`, else one.
+    """
     raise NotImplementedError
 
 
@@ -265,5 +277,5 @@ def _store_row(block, row, value):
 
 
 @overload(block_at)
-def _block_of(blocks, k):
-    return lambda blocks, k: _block(blocks, k)
+def _block_of(blocks, k, like):
+    return lambda blocks, k, like: _block(blocks, k, like)

@@ -1,14 +1,20 @@
-"""Where a block of robots keeps its numbers: one flat array of rows, a row one number per lane.
+"""Where a block keeps its numbers: one flat array of rows.
 
-A block holds `lanes` robots side by side, so that one loop over the lanes of a row is one vector
-instruction or a few. First comes a header of `HEADER` rows, then a record of `RECORD` rows for each
-link, tail first, then `THRUSTER` rows for each thruster. Everything is in one array because a
-compiler that sees two arrays has to fear that they overlap, and gives up vectorising.
+A block is one robot, a row being one number, or `lanes.WIDTH` robots side by side, a row being one
+number for each. First comes a header of `HEADER` rows, then `padded(links)` rows for each quantity
+of the links, tail first, then the thrusters' rows. The rows of a quantity lie together, so that a
+block of one robot can be worked on several links at a time; the padding lets the last of them be
+read and written whole.
 
 Units are SI throughout; vectors are in the global frame.
 """
 
 from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.plant.lanes import WIDTH
 
 # Physics steps since the start, as a float. Position, velocity, acceleration of the centre of mass.
 CLOCK, P_X, P_Y, V_X, V_Y, A_X, A_Y = range(7)
@@ -18,34 +24,50 @@ C_T, C_N, MU, LAMBDA_1, LAMBDA_2, LAMBDA_3 = range(7, 13)
 # mean + amplitude * sin(frequency * t + phase) in each axis.
 WATER_X, WATER_Y, WATER_AX, WATER_AY = range(13, 17)
 MEAN_X, MEAN_Y, AMPLITUDE_X, AMPLITUDE_Y, PHASE_X, PHASE_Y, WATER_FREQUENCY = range(17, 24)
-# Joint controller: gains, and the joint-space inertia that its implicit treatment adds.
+# Joint controllers: gains, and the joint-space inertia that their implicit treatment adds.
 STIFFNESS, DAMPING, JOINT_INERTIA = range(24, 27)
-# Joint references: how many joints bend, the deflection they share, its rate and acceleration; the
+# Joint references: the deflection that the bending joints share, its rate and acceleration; the
 # filter over one physics step (deflection and rate, from either) and what gives the acceleration.
-BENDING_JOINTS, DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(27, 31)
-FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = range(31, 37)
+DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(27, 30)
+FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = range(30, 36)
 # Thrusters: share of the way to the command that one physics step covers, and the limit.
-LAG, LIMIT = range(37, 39)
+LAG, LIMIT = range(36, 38)
 # The path, and guidance: what the heading is, what the line of sight aims at.
-SPEED, SWAY, FREQUENCY, RAMP, LOOK_AHEAD, CROSS_TRACK, HEAD_HEADING = range(39, 46)
-# Times of the changes of the deflection (infinite where there is none), then their sizes.
+SPEED, SWAY, FREQUENCY, RAMP, LOOK_AHEAD, CROSS_TRACK, HEAD_HEADING = range(38, 45)
+# Times of the changes of the deflection (`NEVER` where there is none), then their sizes.
+NEVER = 1e30
 MAX_SHIFTS = 8
-SHIFT_TIME = 46
+SHIFT_TIME = 45
 SHIFT_SIZE = SHIFT_TIME + MAX_SHIFTS
 HEADER = SHIFT_SIZE + MAX_SHIFTS
 
-# Record of a link: angle and rate, sine and cosine, velocity of its centre relative to the water,
-# torque of the joint to the next link, thrust on it along and across, coefficients of the back
-# substitution, angular acceleration.
-THETA, OMEGA, SIN, COS, U_X, U_Y, TORQUE, PUSH_T, PUSH_N = range(9)
-SUB_0, SUB_K, SUB_X, SUB_Y, ALPHA = range(9, 14)
-RECORD = 14
+# Quantities of the links. State: angle and rate. Fixed in an episode: the share of the deflection
+# that is the reference of the joint to the next link, and on which side of the root the link is
+# (1.0 tail, 0.0 the root itself, -1.0 head). Thrust along and across.
+THETA, OMEGA, SHARE, SIDE, PUSH_T, PUSH_N = range(6)
+# Sine and cosine of the angle, velocity of the centre, torque of the joint to the next link.
+SIN, COS, U_X, U_Y, TORQUE, ALPHA = range(6, 12)
+# The link's own answer, see `chain`; once it is eliminated, its back substitution.
+OWN = 12
+SUB_0, SUB_K, SUB_X, SUB_Y = range(OWN, OWN + 4)
+QUANTITIES = OWN + 9
 
-# Rows of a thruster: command and force.
-COMMAND, FORCE = range(2)
-THRUSTER = 2
+
+def padded(links: int) -> int:
+    """Rows that each quantity of the links takes."""
+    return -(-links // WIDTH) * WIDTH
+
+
+def sides(links: int) -> NDArray[np.float64]:
+    """The quantity SIDE of every link, (links,); the root is link `links // 2`, from 0."""
+    return np.sign(links // 2 - np.arange(links)).astype(np.float64)
+
+
+def first_thruster(links: int) -> int:
+    """Row of the first thruster's command; the thrusters' forces follow the commands."""
+    return HEADER + QUANTITIES * padded(links)
 
 
 def rows(links: int, thrusters: int) -> int:
     """Number of rows of a block for robots of `links` links and `thrusters` thrusters."""
-    return HEADER + links * RECORD + thrusters * THRUSTER
+    return first_thruster(links) + 2 * thrusters

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.plant.chain import row_of
 from usm_gym.plant.compile import piece
 from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
@@ -63,11 +64,17 @@ def command(row, lanes, lane, links, action):
     """Set the thruster commands of one robot from its action in [-1, 1]; beyond it saturates.
 
     `row` is the block of the robot, shape (rows * lanes,), and `lane` its place in it.
+
+    Returns:
+        The mean absolute command, N.
     """
     limit = row[LIMIT * lanes + lane]
+    effort = 0.0
     for j in range(action.size):
         share = min(max(float(action[j]), -1.0), 1.0)
-        row[(HEADER + links * RECORD + j * THRUSTER + COMMAND) * lanes + lane] = share * limit
+        row[(row_of(QUANTITIES, links) + j) * lanes + lane] = share * limit
+        effort += abs(share * limit)
+    return effort / action.size
 
 
 @piece
@@ -109,31 +116,29 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
     observation[k] = a_x / scale[k]
     observation[k + 1] = a_y / scale[k + 1]
 
-    theta = row[(HEADER + THETA) * lanes + lane]
-    omega = row[(HEADER + OMEGA) * lanes + lane]
+    angles, rates, shares = row_of(THETA, links), row_of(OMEGA, links), row_of(SHARE, links)
+    theta = row[angles * lanes + lane]
+    omega = row[rates * lanes + lane]
     observation[starts[TAIL_ANGLE]] = theta / scale[starts[TAIL_ANGLE]]
     observation[starts[TAIL_RATE]] = omega / scale[starts[TAIL_RATE]]
-    bending = row[BENDING_JOINTS * lanes + lane]
-    share = 1.0 / bending
-    reference = share * row[DEFLECTION * lanes + lane]
-    reference_rate = share * row[DEFLECTION_RATE * lanes + lane]
-    reference_acceleration = share * row[DEFLECTION_ACCELERATION * lanes + lane]
+    reference = row[DEFLECTION * lanes + lane]
+    reference_rate = row[DEFLECTION_RATE * lanes + lane]
+    reference_acceleration = row[DEFLECTION_ACCELERATION * lanes + lane]
     heading = theta
     for i in range(links - 1):
-        following = HEADER + (i + 1) * RECORD
-        theta_next = row[(following + THETA) * lanes + lane]
-        omega_next = row[(following + OMEGA) * lanes + lane]
-        bends = 1.0 if i + bending >= links - 1 else 0.0
+        theta_next = row[(angles + i + 1) * lanes + lane]
+        omega_next = row[(rates + i + 1) * lanes + lane]
+        share = row[(shares + i) * lanes + lane]
         k = starts[JOINT_ANGLES] + i
         observation[k] = (theta - theta_next) / scale[k]
         k = starts[JOINT_RATES] + i
         observation[k] = (omega - omega_next) / scale[k]
         k = starts[JOINT_REFERENCES] + i
-        observation[k] = bends * reference / scale[k]
+        observation[k] = share * reference / scale[k]
         k = starts[JOINT_REFERENCE_RATES] + i
-        observation[k] = bends * reference_rate / scale[k]
+        observation[k] = share * reference_rate / scale[k]
         k = starts[JOINT_REFERENCE_ACCELERATIONS] + i
-        observation[k] = bends * reference_acceleration / scale[k]
+        observation[k] = share * reference_acceleration / scale[k]
         theta, omega = theta_next, omega_next
         heading += theta
     heading = theta if row[HEAD_HEADING * lanes + lane] > 0.0 else heading / links
@@ -145,10 +150,10 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
     observation[k] = heading_error / scale[k]
 
     limit = row[LIMIT * lanes + lane]
+    commands = row_of(QUANTITIES, links)
     k = starts[THRUSTER_COMMAND]
     for j in range(starts[THRUSTER_LIMIT] - k):
-        thruster = HEADER + links * RECORD + j * THRUSTER
-        observation[k + j] = row[(thruster + COMMAND) * lanes + lane] / limit / scale[k + j]
+        observation[k + j] = row[(commands + j) * lanes + lane] / limit / scale[k + j]
     k = starts[THRUSTER_LIMIT]
     observation[k] = limit / scale[k]
     for k in range(observation.size):

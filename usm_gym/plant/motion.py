@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import arctan, exp_of_negative, sincos
 
@@ -33,11 +31,15 @@ def path(t, speed, sway, frequency, ramp):
 def filter_coefficients(frequency, step):
     """The critically damped filter x'' = w^2 (target - x) - 2 w x' over one physics step, exactly.
 
+    Args:
+        frequency: w, rad/s; 0 for no filter, the reference then being the target itself.
+        step: Physics step, s.
+
     Returns:
         (x from x, x from x', x' from x, x' from x', w^2, 2 w), x measured from the target; all
-        zero for an infinite frequency: the reference then is the target itself.
+        zero without a filter.
     """
-    if frequency == np.inf:
+    if frequency == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     wh = frequency * step
     decay = exp_of_negative(-wh)

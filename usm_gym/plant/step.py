@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.chain import Body, accelerate
+from usm_gym.plant.chain import Body, accelerate, row_of
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
@@ -50,16 +50,22 @@ class Fleet(NamedTuple):
         blocks: All their numbers, see `layout`, shape (blocks, rows * lanes).
         instant: Control periods since the start, int64, (size,).
         noise: Measurement errors of the position, m, (size, control instants, 2).
+        settled: Control period from which on errors count, int64, (size,).
         error: True position errors, m, (size, 2).
+        max_error: Their largest absolute values since settling, m, (size, 2).
         heading_error: Heading errors as known on board, rad, (size,).
+        effort: Mean absolute thruster commands, N, (size,).
         observation: Observations, float32, (size, numbers).
     """
 
     blocks: NDArray[np.float64]
     instant: NDArray[np.int64]
     noise: NDArray[np.float64]
+    settled: NDArray[np.int64]
     error: NDArray[np.float64]
+    max_error: NDArray[np.float64]
     heading_error: NDArray[np.float64]
+    effort: NDArray[np.float64]
     observation: NDArray[np.float32]
 
 
@@ -99,58 +105,50 @@ def move_water(block, like, h):
 @piece
 def push(block, like, plant):
     """First-order lag of every thruster, and its force on its link."""
-    for j in range(plant.thruster_links.size):
-        record = HEADER + plant.thruster_links[j] * RECORD
-        store(block, record + PUSH_T, like)
-        store(block, record + PUSH_N, like)
+    links, thrusters = plant.links, plant.thruster_links.size
+    along, across = row_of(PUSH_T, links), row_of(PUSH_N, links)
+    for j in range(thrusters):
+        store(block, along + plant.thruster_links[j], like)
+        store(block, across + plant.thruster_links[j], like)
     lag = load(block, LAG, like)
-    for j in range(plant.thruster_links.size):
-        thruster = HEADER + plant.links * RECORD + j * THRUSTER
-        force = load(block, thruster + FORCE, like)
-        force += lag * (load(block, thruster + COMMAND, like) - force)
-        store(block, thruster + FORCE, force)
-        direction = PUSH_N if plant.thruster_is_normal[j] else PUSH_T
-        target = HEADER + plant.thruster_links[j] * RECORD + direction
+    commands = row_of(QUANTITIES, links)
+    forces = commands + thrusters
+    for j in range(thrusters):
+        force = load(block, forces + j, like)
+        force += lag * (load(block, commands + j, like) - force)
+        store(block, forces + j, force)
+        target = plant.thruster_links[j] + (across if plant.thruster_is_normal[j] else along)
         store(block, target, load(block, target, like) + force)
 
 
 @piece
-def joint_torques(block, like, links, implicit):
+def joint_torques(block, like, wide, stride, links, implicit):
     """Torque of every joint controller, less the part that is in the joint-space inertia.
 
     u = k_p (phi_ref - phi - h phi') + k_d (phi_ref' - phi') - (h k_d + h^2 k_p) phi''.
     """
-    bending = load(block, BENDING_JOINTS, like)
-    k_p = load(block, STIFFNESS, like)
-    k_d = load(block, DAMPING, like)
-    share = 1.0 / bending
-    target = k_p * (share * load(block, DEFLECTION, like)) + k_d * (
-        share * load(block, DEFLECTION_RATE, like)
-    )
+    k_p, k_d = load(block, STIFFNESS, like), load(block, DAMPING, like)
+    target = k_p * load(block, DEFLECTION, like) + k_d * load(block, DEFLECTION_RATE, like)
     damping = k_d + implicit * k_p
-    theta = load(block, HEADER + THETA, like)
-    omega = load(block, HEADER + OMEGA, like)
-    for i in range(links - 1):
-        record = HEADER + i * RECORD
-        theta_next = load(block, record + RECORD + THETA, like)
-        omega_next = load(block, record + RECORD + OMEGA, like)
-        wanted = where(i + bending >= links - 1.0, target, like)
-        torque = wanted - k_p * (theta - theta_next) - damping * (omega - omega_next)
-        store(block, record + TORQUE, torque)
-        theta, omega = theta_next, omega_next
+    theta, omega = row_of(THETA, links), row_of(OMEGA, links)
+    for i in range(0, links - 1, stride):
+        phi = load(block, theta + i, wide) - load(block, theta + i + 1, wide)
+        phi_dot = load(block, omega + i, wide) - load(block, omega + i + 1, wide)
+        wanted = target * load(block, row_of(SHARE, links) + i, wide)
+        store(block, row_of(TORQUE, links) + i, wanted - k_p * phi - damping * phi_dot)
 
 
 @piece
-def integrate(block, like, links, h, implicit):
+def integrate(block, like, wide, stride, links, h, implicit):
     """Positions from the new velocities, or from the old ones where `implicit` is 0."""
     symplectic = implicit > 0.0
-    for i in range(links):
-        record = HEADER + i * RECORD
-        old = load(block, record + OMEGA, like)
-        new = old + h * load(block, record + ALPHA, like)
+    theta, omega, alpha = row_of(THETA, links), row_of(OMEGA, links), row_of(ALPHA, links)
+    for i in range(0, links, stride):
+        old = load(block, omega + i, wide)
+        new = old + h * load(block, alpha + i, wide)
         rate = new if symplectic else old
-        store(block, record + OMEGA, new)
-        store(block, record + THETA, load(block, record + THETA, like) + h * rate)
+        store(block, omega + i, new)
+        store(block, theta + i, load(block, theta + i, wide) + h * rate)
     for axis in range(2):
         old = load(block, V_X + axis, like)
         new = old + h * load(block, A_X + axis, like)
@@ -161,33 +159,40 @@ def integrate(block, like, links, h, implicit):
 
 
 @piece
-def advance(block, like, plant):
-    """Advance one block by a control period."""
-    h, implicit = plant.h, plant.body.h
+def advance(block, like, wide, stride, plant):
+    """Advance one block by a control period; `like`, `wide` and `stride` as in `chain`."""
+    links, h, implicit = plant.links, plant.h, plant.body.h
     for _ in range(plant.substeps):
         if implicit > 0.0:
             advance_references(block, like, plant.shifts, h)
         if plant.moving_water:
             move_water(block, like, h)
         push(block, like, plant)
-        joint_torques(block, like, plant.links, implicit)
-        accelerate(block, like, plant.links, plant.body)
-        integrate(block, like, plant.links, h, implicit)
+        joint_torques(block, like, wide, stride, links, implicit)
+        accelerate(block, like, wide, stride, links, plant.body)
         if implicit == 0.0:
             advance_references(block, like, plant.shifts, h)
+        integrate(block, like, wide, stride, links, h, implicit)
 
 
 @piece
-def run(fleet, plant, table, actions, like, lanes, first, last):
+def run(fleet, plant, table, actions, like, lanes, stride, first, last):
     """One control period of blocks `first` to `last`: command, advance, measure."""
     size = actions.shape[0]
     for k in range(first, last):
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
-            command(fleet.blocks[k], lanes, robot - k * lanes, plant.links, actions[robot])
-        advance(block_at(fleet.blocks, k), like, plant)
+            fleet.effort[robot] = command(
+                fleet.blocks[k], lanes, robot - k * lanes, plant.links, actions[robot]
+            )
+        advance(block_at(fleet.blocks, k, like), like, spread(0.0), stride, plant)
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
             fleet.instant[robot] += 1
             observe(fleet, plant, table, robot, lanes)
+            if fleet.instant[robot] >= fleet.settled[robot]:
+                for axis in range(2):
+                    size_now = abs(fleet.error[robot, axis])
+                    if size_now > fleet.max_error[robot, axis]:
+                        fleet.max_error[robot, axis] = size_now
 
 
 @piece
@@ -215,10 +220,10 @@ def observe_one(fleet, plant, table, robot, lanes):
 @compiled
 def run_singles(fleet, plant, table, actions, first, last):
     """`run` for blocks of one robot each."""
-    run(fleet, plant, table, actions, 0.0, 1, first, last)
+    run(fleet, plant, table, actions, 0.0, 1, WIDTH, first, last)
 
 
 @compiled
 def run_lanes(fleet, plant, table, actions, first, last):
     """`run` for blocks of `lanes.WIDTH` robots each."""
-    run(fleet, plant, table, actions, spread(0.0), WIDTH, first, last)
+    run(fleet, plant, table, actions, spread(0.0), WIDTH, 1, first, last)
