@@ -11,7 +11,7 @@ from usm_gym.validation import require
 
 # Controllers are given this long after each change of the joint references, s.
 RECOVERY = 7.0
-# A robot further from its reference than this in either axis is lost, and counts as much at least, m.
+# Further from its reference than this in either axis a robot is lost, and counts at least this, m.
 LOST_ERROR = 0.5
 
 
@@ -29,7 +29,8 @@ def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> ND
     Raises:
         ValueError: If shapes do not match, a value is not finite or no sample is late enough.
     """
-    return _largest(*_checked(time, error, settle_time), "settle_time", settle_time)
+    _, errors, late = _checked(time, error, settle_time)
+    return np.asarray(np.abs(errors[late]).max(axis=0))
 
 
 def settled_error(
@@ -49,7 +50,8 @@ def settled_error(
     times, errors, late = _checked(time, error, settle_time)
     for shift in shifts:
         late &= (times < shift) | (times >= shift + RECOVERY)
-    return _largest(times, errors, late, "shifts", shifts)
+    require(late.any(), "shifts", shifts, f"some of the time up to {times[-1]} s left")
+    return np.asarray(np.abs(errors[late]).max(axis=0))
 
 
 def rms_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
@@ -90,14 +92,3 @@ def _checked(
     late = times >= settle_time
     require(late.any(), "settle_time", settle_time, "a time before the last sample")
     return times, errors, late
-
-
-def _largest(
-    times: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    which: NDArray[np.bool_],
-    name: str,
-    value: object,
-) -> NDArray[np.float64]:
-    require(which.any(), name, value, f"some of the time up to {times[-1]} s left")
-    return np.asarray(np.abs(errors[which]).max(axis=0))

@@ -53,7 +53,7 @@ class Simulation:
         observation: Observations, float32, (size, numbers).
         max_error: Largest true errors so far after settling, m, (size, 2); 0 before.
         effort: Mean absolute thruster commands, N, (size,).
-        lost: Which robots are lost: further than `LOST_ERROR` from the reference, or not finite, (size,).
+        lost: Which robots are lost: their error beyond `LOST_ERROR` or not finite, (size,).
         steps: Control periods in each episode, int64, (size,).
     """
 
