@@ -13,5 +13,6 @@ def register_environments() -> None:
         gym.register(
             id=f"USM-{mode.capitalize()}-v0",
             entry_point="usm_gym.env:USMEnv",
+            vector_entry_point="usm_gym.vector_env:USMVectorEnv",
             kwargs={"mode": mode},
         )

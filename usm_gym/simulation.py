@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -57,8 +59,15 @@ class Simulation:
         steps: Control periods in each episode, int64, (size,).
     """
 
-    def __init__(self, robot: Robot, scenarios: Sequence[Scenario]) -> None:
-        """Start all robots at the beginning of the given scenarios."""
+    def __init__(self, robot: Robot, scenarios: Sequence[Scenario], threads: int = 1) -> None:
+        """Start all robots at the beginning of the given scenarios.
+
+        Args:
+            robot: The robot.
+            scenarios: One scenario for each copy of it.
+            threads: How many threads share a step; without effect on its result.
+        """
+        require(threads >= 1, "threads", threads, "1 or more")
         self.robot = robot
         self.size = len(scenarios)
         self.layout = ObservationLayout(robot.links, len(robot.thrusters))
@@ -80,6 +89,9 @@ class Simulation:
         self.lost = np.zeros(self.size, bool)
         self._settled = np.zeros(self.size, np.int64)
         self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, 2))
+        self._threads = min(threads, blocks)
+        self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
+        self._shifts, self._moving_water = 0, False
         self._share_out()
         for index, scenario in enumerate(scenarios):
             self.start(index, scenario)
@@ -142,11 +154,14 @@ class Simulation:
         self.effort[index] = 0.0
         self.lost[index] = False
         noise = scenario.noise()
-        if len(noise) > self._noise.shape[1]:
-            longer = ((0, 0), (0, len(noise) - self._noise.shape[1]), (0, 0))
-            self._noise = np.pad(self._noise, longer)
+        missing = len(noise) - self._noise.shape[1]
+        shifts, moving = len(scenario.shifts), any(scenario.water.amplitude)
+        if missing > 0 or shifts > self._shifts or moving > self._moving_water:
+            self._noise = np.pad(self._noise, ((0, 0), (0, max(missing, 0)), (0, 0)))
+            self._shifts = max(shifts, self._shifts)
+            self._moving_water |= moving
+            self._share_out()
         self._noise[index, : len(noise)] = noise
-        self._share_out()
         observe_one(self._fleet, self._plant, self._table, index, self._lanes)
 
     def step(self, action: NDArray[Any]) -> None:
@@ -156,12 +171,26 @@ class Simulation:
             action: Thruster commands over the thruster limits, (size, thrusters); values beyond
                 [-1, 1] saturate.
         """
-        self._kernel(self._fleet, self._plant, self._table, action, 0, len(self._rows))
+        edges = np.linspace(0, len(self._rows), self._threads + 1, dtype=np.int64).tolist()
+        arguments = (self._fleet, self._plant, self._table, action)
+        others = [
+            self._pool.submit(self._kernel, *arguments, first, last)
+            for first, last in pairwise(edges[:-1])
+            if self._pool is not None
+        ]
+        self._kernel(*arguments, *edges[-2:])
+        for other in others:
+            other.result()
         # Compiled code assumes finite numbers, so that what is none is found here.
         distance = np.abs(self.error).max(axis=1) + 0.0 * self.heading_error
         np.logical_not(distance <= LOST_ERROR, out=self.lost)
         if self.lost.any():
             self._tidy(self.lost)
+
+    def close(self) -> None:
+        """Give back the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
 
     def snapshot(self) -> Snapshot:
         """Copy the whole state."""
@@ -204,8 +233,8 @@ class Simulation:
             thruster_is_normal=self.robot.thruster_is_normal,
             h=conditions.physics_step,
             substeps=conditions.substeps,
-            shifts=max(len(scenario.shifts) for scenario in self.scenarios),
-            moving_water=any(any(scenario.water.amplitude) for scenario in self.scenarios),
+            shifts=self._shifts,
+            moving_water=self._moving_water,
         )
         self._fleet = Fleet(
             blocks=self._rows.reshape(len(self._rows), -1),

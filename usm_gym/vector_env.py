@@ -1,0 +1,238 @@
+"""The native vector environment: many robots in one simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from usm_gym.env import action_space, checked_action, infos, outcome, scenario_of
+from usm_gym.nominal import Nominal, nominal_of
+from usm_gym.observation import ObservationLayout
+from usm_gym.robot import Robot
+from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named
+from usm_gym.simulation import Simulation
+from usm_gym.validation import require
+
+Observations = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+
+class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any]):
+    """`num_envs` underwater swimming manipulators, each as in `USMEnv`, to the bit.
+
+    Made by `gym.make_vec("USM-Operation-v0", num_envs=256,
+    vectorization_mode="vector_entry_point")`. Spaces, reward, start, end and info are those of
+    `USMEnv` with a batch axis; robot i with seed s behaves as the single environment with seed s.
+
+    `reset(seed=s)` gives robot i the seed s + i; a list gives each its own. The option "scenario"
+    is for all robots, or a list with one for each (None draws one); the option "reset_mask", a bool
+    array, resets only some. All three autoreset modes are supported: "NextStep" (Gymnasium's
+    default), "SameStep" with `final_obs` and `final_info`, and "Disabled".
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        mode: Mode,
+        conditions: str | Mapping[str, Any] | Conditions = "field",
+        robot: Mapping[str, Any] | Robot | None = None,
+        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int = 1,
+    ) -> None:
+        """Make the environment.
+
+        Args:
+            num_envs: How many robots.
+            mode: "operation" or "torpedo".
+            conditions: As of `USMEnv`.
+            robot: As of `USMEnv`.
+            render_mode: As of `USMEnv`.
+            autoreset_mode: What happens to a robot whose episode has ended.
+            threads: How many threads share a step; without effect on its result.
+
+        Raises:
+            ValueError: If an argument is not allowed.
+        """
+        require(isinstance(num_envs, int) and num_envs >= 1, "num_envs", num_envs, "1 or more")
+        require(isinstance(threads, int) and threads >= 1, "threads", threads, "1 or more")
+        require(render_mode is None, "render_mode", render_mode, "None")
+        self.num_envs = num_envs
+        self.mode = mode
+        self.conditions = conditions_of(conditions)
+        self.robot = robot if isinstance(robot, Robot) else Robot(**(robot or {}))
+        self.threads = threads
+        self.render_mode = render_mode
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
+        self.single_observation_space = self.layout.space
+        self.single_action_space = action_space(self.robot)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._streams: list[np.random.Generator] = []
+        self._simulation: Simulation | None = None
+        self._done = np.zeros(num_envs, bool)
+
+    @property
+    def nominal(self) -> Nominal:
+        """What a controller may know beforehand."""
+        scenario = named("nominal", self.mode, self.conditions)
+        if self._simulation is not None:
+            scenario = self._simulation.scenarios[0]
+        return nominal_of(self.robot, scenario)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation of all robots."""
+        if self._simulation is None:
+            raise gym.error.ResetNeeded("call reset() before anything else")
+        return self._simulation
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start the episodes of all robots, or of those in `options["reset_mask"]`.
+
+        Raises:
+            ValueError: If a seed, an option or a scenario is not valid.
+        """
+        options = dict(options or {})
+        which = self._mask(options.pop("reset_mask", None))
+        self._seed(seed, which)
+        indices = np.flatnonzero(which).tolist()
+        scenarios = {i: self._draw(i, self._options_of(i, options)) for i in indices}
+        if which.all():
+            ordered = [scenarios[i] for i in indices]
+            self.close_extras()
+            self._simulation = Simulation(self.robot, ordered, self.threads)
+        else:
+            for index, scenario in scenarios.items():
+                self.simulation.start(index, scenario)
+        self._done[which] = False
+        return self.simulation.observation.copy(), self._infos(which)
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+        """Hold the thruster commands of all robots for one control period.
+
+        Raises:
+            ValueError: If the actions have the wrong shape or are not finite.
+            gymnasium.error.ResetNeeded: If, without autoreset, an episode has ended.
+        """
+        simulation = self.simulation
+        batch = checked_action(actions, (self.num_envs, len(self.robot.thrusters)))
+        waiting = self._done.copy()
+        if self.autoreset_mode is AutoresetMode.DISABLED and waiting.any():
+            raise gym.error.ResetNeeded(f"robots {np.flatnonzero(waiting).tolist()} wait for reset")
+        simulation.step(batch)
+        if waiting.any():
+            # Next-step autoreset: these robots' step is their reset, their action is ignored.
+            self._restart(waiting)
+        rewards, terminated, truncated = outcome(simulation)
+        rewards[waiting] = 0.0
+        done = terminated | truncated
+        everyone = np.ones(self.num_envs, bool)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and done.any():
+            final = self._final(done)
+            self._restart(done)
+            return (
+                simulation.observation.copy(),
+                rewards,
+                terminated,
+                truncated,
+                {**final, **self._infos(everyone)},
+            )
+        self._done = done
+        return (
+            simulation.observation.copy(),
+            rewards,
+            terminated,
+            truncated,
+            self._infos(everyone),
+        )
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Give back the threads."""
+        if self._simulation is not None:
+            self._simulation.close()
+
+    def _restart(self, which: Flags) -> None:
+        for index in np.flatnonzero(which).tolist():
+            self.simulation.start(index, self._draw(index, {}))
+
+    def _draw(self, index: int, options: Mapping[str, Any]) -> Scenario:
+        stream = self._streams[index]
+        return scenario_of(options, self.mode, self.conditions, self.robot, stream)
+
+    def _seed(self, seed: int | Sequence[int | None] | None, which: Flags) -> None:
+        seeds: Sequence[int | None]
+        if seed is None:
+            seeds = [None] * self.num_envs
+        elif isinstance(seed, (int, np.integer)):
+            seeds = [int(seed) + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+            require(len(seeds) == self.num_envs, "seed", seed, f"{self.num_envs} seeds")
+        if not self._streams:
+            require(which.all(), "reset_mask", which, "all robots at the first reset")
+            self._streams = [seeding.np_random(each)[0] for each in seeds]
+            return
+        for index in np.flatnonzero(which).tolist():
+            if seeds[index] is not None:
+                self._streams[index] = seeding.np_random(seeds[index])[0]
+
+    def _mask(self, mask: Any) -> Flags:
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        valid = (
+            isinstance(mask, np.ndarray)
+            and mask.shape == (self.num_envs,)
+            and mask.dtype == np.bool_
+            and mask.any()
+        )
+        require(
+            valid, "reset_mask", mask, f"a bool array of shape ({self.num_envs},), not all False"
+        )
+        return np.asarray(mask, bool)
+
+    def _options_of(self, index: int, options: Mapping[str, Any]) -> dict[str, Any]:
+        scenario = options.get("scenario")
+        if not isinstance(scenario, (list, tuple)):
+            return dict(options)
+        require(
+            len(scenario) == self.num_envs,
+            "scenario",
+            scenario,
+            f"a list of {self.num_envs} scenarios",
+        )
+        return {**options, "scenario": scenario[index]}
+
+    def _infos(self, which: Flags) -> dict[str, Any]:
+        vector: dict[str, Any] = {}
+        for key, values in infos(self.simulation).items():
+            vector[key] = np.where(which, values, np.zeros_like(values))
+            vector[f"_{key}"] = which
+        return vector
+
+    def _final(self, done: Flags) -> dict[str, Any]:
+        observations = np.full(self.num_envs, None, dtype=object)
+        for index in np.flatnonzero(done).tolist():
+            observations[index] = self.simulation.observation[index].copy()
+        return {
+            "final_obs": observations,
+            "_final_obs": done,
+            "final_info": self._infos(done),
+            "_final_info": done,
+        }
