@@ -299,8 +299,10 @@ def substitute(block, like, i, side, links, l, motion):
 
 
 @piece
-def accelerate(block, like, wide, stride, links, body):
+def accelerate(block, like, wide, stride, links, base, body):
     """Fill in ALPHA of every link and the acceleration A_X, A_Y of the centre of mass.
+
+    `base` is what `kinematics` has returned.
 
     A neutrally buoyant robot does not notice that all the water accelerates: relative to the water
     nothing changes, so the water's acceleration is added to that of the centre of mass.
@@ -308,7 +310,6 @@ def accelerate(block, like, wide, stride, links, body):
     l = body.l
     root = links // 2
     last = links - 1
-    base = kinematics(block, like, wide, stride, links, l)
     own_answers(block, like, wide, stride, links, base, body)
     tail = (like, like, like, like, like, like, like, like, like)
     head = tail
@@ -335,4 +336,6 @@ def accelerate(block, like, wide, stride, links, body):
 @compiled
 def accelerate_one(blocks, links, body):
     """`accelerate` for the first of the blocks of one robot each."""
-    accelerate(block_at(blocks, 0, 0.0), 0.0, spread(0.0), WIDTH, links, body)
+    block, wide = block_at(blocks, 0, 0.0), spread(0.0)
+    base = kinematics(block, 0.0, wide, WIDTH, links, body.l)
+    accelerate(block, 0.0, wide, WIDTH, links, base, body)

@@ -102,7 +102,7 @@ def exp_of_negative(x: float) -> float:
 def cube_root(x: float) -> float:
     """The cube root of x >= 0, by Halley's iteration from an estimate made of the exponent."""
     estimate = np.int64(np.float64(x).view(np.int64) // 3 + 3071306043645493248).view(np.float64)
-    for _ in range(3):
+    for _ in range(2):
         cube = estimate * estimate * estimate
         estimate = estimate * ((cube + 2.0 * x) / (2.0 * cube + x))
     # One Newton step on the residual rounds the last bit.

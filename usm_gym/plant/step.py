@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.chain import Body, accelerate, row_of
+from usm_gym.plant.chain import Body, accelerate, kinematics, row_of
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
@@ -159,20 +159,27 @@ def integrate(block, like, wide, stride, links, h, implicit):
 
 
 @piece
+def physics_step(block, like, wide, stride, plant, base):
+    """One physics step from kinematics that are known; arguments as in `chain.accelerate`."""
+    links, h, implicit = plant.links, plant.h, plant.body.h
+    if implicit > 0.0:
+        advance_references(block, like, plant.shifts, h)
+    push(block, like, plant)
+    joint_torques(block, like, wide, stride, links, implicit)
+    accelerate(block, like, wide, stride, links, base, plant.body)
+    if implicit == 0.0:
+        advance_references(block, like, plant.shifts, h)
+    integrate(block, like, wide, stride, links, h, implicit)
+
+
+@piece
 def advance(block, like, wide, stride, plant):
     """Advance one block by a control period; `like`, `wide` and `stride` as in `chain`."""
-    links, h, implicit = plant.links, plant.h, plant.body.h
     for _ in range(plant.substeps):
-        if implicit > 0.0:
-            advance_references(block, like, plant.shifts, h)
         if plant.moving_water:
-            move_water(block, like, h)
-        push(block, like, plant)
-        joint_torques(block, like, wide, stride, links, implicit)
-        accelerate(block, like, wide, stride, links, plant.body)
-        if implicit == 0.0:
-            advance_references(block, like, plant.shifts, h)
-        integrate(block, like, wide, stride, links, h, implicit)
+            move_water(block, like, plant.h)
+        base = kinematics(block, like, wide, stride, plant.links, plant.body.l)
+        physics_step(block, like, wide, stride, plant, base)
 
 
 @piece

@@ -21,25 +21,22 @@ def allocation_matrix(sine, cosine, l, thruster_links, thruster_is_normal, T):
         T: Where to write.
     """
     n = sine.size
+    share = 1.0 / n
     x, y, mean_x, mean_y = 0.0, 0.0, 0.0, 0.0
-    for i in range(1, n):
-        x += l * (cosine[i - 1] + cosine[i])
-        y += l * (sine[i - 1] + sine[i])
-        mean_x += x
-        mean_y += y
-    mean_x /= n
-    mean_y /= n
-    for j in range(thruster_links.size):
-        link = thruster_links[j]
-        x, y = 0.0, 0.0
-        for i in range(1, link + 1):
+    for i in range(n):
+        if i > 0:
             x += l * (cosine[i - 1] + cosine[i])
             y += l * (sine[i - 1] + sine[i])
-        if thruster_is_normal[j]:
-            T[0, j], T[1, j] = -sine[link], cosine[link]
-        else:
-            T[0, j], T[1, j] = cosine[link], sine[link]
-        T[2, j] = (x - mean_x) * T[1, j] - (y - mean_y) * T[0, j]
+        mean_x += x * share
+        mean_y += y * share
+        for j in range(thruster_links.size):
+            if thruster_links[j] == i:
+                T[0, j] = -sine[i] if thruster_is_normal[j] else cosine[i]
+                T[1, j] = cosine[i] if thruster_is_normal[j] else sine[i]
+                # Moment about the tail's centre, until the centre of mass is known.
+                T[2, j] = x * T[1, j] - y * T[0, j]
+    for j in range(thruster_links.size):
+        T[2, j] -= mean_x * T[1, j] - mean_y * T[0, j]
 
 
 @piece
