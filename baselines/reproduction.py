@@ -1,4 +1,4 @@
-"""The paper as printed: laws and plant in one compiled loop at its step, without a thruster limit."""
+"""The paper as printed: plant and laws in one compiled loop at its step, no thruster limit."""
 
 from __future__ import annotations
 
@@ -70,8 +70,17 @@ class Record(NamedTuple):
 
 def record_for(samples: int, links: int) -> Record:
     """An empty record."""
-    pairs = [np.empty((samples, 2)) for _ in range(5)]
-    return Record(np.empty(samples), *pairs, np.empty(samples), np.empty((samples, links)))
+    pairs = np.empty((5, samples, 2))
+    return Record(
+        time=np.empty(samples),
+        reference=pairs[0],
+        error=pairs[1],
+        force=pairs[2],
+        sigma=pairs[3],
+        observer_error=pairs[4],
+        effort=np.empty(samples),
+        theta=np.empty((samples, links)),
+    )
 
 
 def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None = None) -> Record:

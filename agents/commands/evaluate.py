@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents.terminal import output_console, progress_bar
@@ -177,6 +178,9 @@ def table(results: dict[str, Any], title: str) -> Table:
         "policy",
         title=f"largest position error after settling, mm: mean [95 % interval] ({title})",
         title_justify="left",
+        title_style="",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
     )
     for heading in ("x", "y", "worst x", "worst y", "settled x", "settled y"):
         rows.add_column(heading, justify="right")
