@@ -7,12 +7,12 @@ import os
 import sys
 from collections.abc import Sequence
 
-from agents.commands import evaluate, policies
+from agents.commands import bench, evaluate, policies
 from agents.terminal import Parser
 from usm_gym import __version__
 from usm_gym.validation import in_one_line
 
-COMMANDS = (policies, evaluate)
+COMMANDS = (policies, evaluate, bench)
 
 DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers, compare them, train
@@ -20,6 +20,7 @@ residual agents. A first look, in half a minute:
 
   usm evaluate                 every policy on the fifty frozen operation scenarios
   usm policies                 what there is to compare
+  usm bench                    how fast all this is here
 """
 
 

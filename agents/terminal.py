@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import NoReturn
 
@@ -36,3 +37,9 @@ def progress_bar() -> Progress:
         transient=True,
         disable=not console.is_terminal,
     )
+
+
+def figures(value: float) -> str:
+    """A number to three figures, without an exponent."""
+    decimals = 2 - math.floor(math.log10(abs(value))) if value else 2
+    return f"{value:.{min(max(decimals, 0), 6)}f}"

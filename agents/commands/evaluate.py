@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from agents.terminal import output_console, progress_bar
+from agents.terminal import figures, output_console, progress_bar
 from baselines.policy import Policy
 from baselines.registry import entry, ids, make
 from usm_gym.evaluation import evaluate
@@ -202,9 +201,3 @@ def table(results: dict[str, Any], title: str) -> Table:
 def mm(metres: float) -> str:
     """A length in mm to three figures."""
     return figures(1e3 * metres)
-
-
-def figures(value: float) -> str:
-    """A number to three figures, without an exponent."""
-    decimals = 2 - math.floor(math.log10(abs(value))) if value else 2
-    return f"{value:.{min(max(decimals, 0), 6)}f}"
