@@ -23,20 +23,23 @@ def allocation_matrix(sine, cosine, l, thruster_links, thruster_is_normal, T):
     n = sine.size
     share = 1.0 / n
     x, y, mean_x, mean_y = 0.0, 0.0, 0.0, 0.0
-    for i in range(n):
-        if i > 0:
-            x += l * (cosine[i - 1] + cosine[i])
-            y += l * (sine[i - 1] + sine[i])
+    for i in range(1, n):
+        x += l * (cosine[i - 1] + cosine[i])
+        y += l * (sine[i - 1] + sine[i])
         mean_x += x * share
         mean_y += y * share
-        for j in range(thruster_links.size):
-            if thruster_links[j] == i:
-                T[0, j] = -sine[i] if thruster_is_normal[j] else cosine[i]
-                T[1, j] = cosine[i] if thruster_is_normal[j] else sine[i]
-                # Moment about the tail's centre, until the centre of mass is known.
-                T[2, j] = x * T[1, j] - y * T[0, j]
+    at, x, y = 0, -mean_x, -mean_y
     for j in range(thruster_links.size):
-        T[2, j] -= mean_x * T[1, j] - mean_y * T[0, j]
+        link = thruster_links[j]
+        if link < at:
+            at, x, y = 0, -mean_x, -mean_y
+        for i in range(at + 1, link + 1):
+            x += l * (cosine[i - 1] + cosine[i])
+            y += l * (sine[i - 1] + sine[i])
+        at = link
+        T[0, j] = -sine[link] if thruster_is_normal[j] else cosine[link]
+        T[1, j] = cosine[link] if thruster_is_normal[j] else sine[link]
+        T[2, j] = x * T[1, j] - y * T[0, j]
 
 
 @piece
