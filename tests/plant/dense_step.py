@@ -41,31 +41,29 @@ def random_moment(robot: Robot, rng: np.random.Generator, steps: int) -> Moment:
 
 def read(simulation: Simulation, index: int = 0) -> Moment:
     """Return the moment that a robot of a simulation is in."""
-    row = _row(simulation.snapshot().arrays["_rows"], index)
-    links, thrusters = _tables(simulation.robot, row)
+    rows = _Rows(simulation.robot, simulation.snapshot().arrays["_rows"], index)
     return Moment(
-        steps=int(row[layout.CLOCK]),
-        theta=links[:, layout.THETA],
-        theta_dot=links[:, layout.OMEGA],
-        p=row[[layout.P_X, layout.P_Y]],
-        p_dot=row[[layout.V_X, layout.V_Y]],
-        reference=row[[layout.DEFLECTION, layout.DEFLECTION_RATE]],
-        thrust=thrusters[:, layout.FORCE],
+        steps=int(rows.row[layout.CLOCK]),
+        theta=rows.links(layout.THETA).copy(),
+        theta_dot=rows.links(layout.OMEGA).copy(),
+        p=rows.row[[layout.P_X, layout.P_Y]],
+        p_dot=rows.row[[layout.V_X, layout.V_Y]],
+        reference=rows.row[[layout.DEFLECTION, layout.DEFLECTION_RATE]],
+        thrust=rows.forces().copy(),
     )
 
 
 def place(simulation: Simulation, moment: Moment, index: int = 0) -> None:
     """Put a robot of a simulation into a moment."""
     snapshot = simulation.snapshot()
-    row = _row(snapshot.arrays["_rows"], index)
-    links, thrusters = _tables(simulation.robot, row)
-    row[layout.CLOCK] = moment.steps
-    links[:, layout.THETA] = moment.theta
-    links[:, layout.OMEGA] = moment.theta_dot
-    row[[layout.P_X, layout.P_Y]] = moment.p
-    row[[layout.V_X, layout.V_Y]] = moment.p_dot
-    row[[layout.DEFLECTION, layout.DEFLECTION_RATE]] = moment.reference
-    thrusters[:, layout.FORCE] = moment.thrust
+    rows = _Rows(simulation.robot, snapshot.arrays["_rows"], index)
+    rows.row[layout.CLOCK] = moment.steps
+    rows.links(layout.THETA)[:] = moment.theta
+    rows.links(layout.OMEGA)[:] = moment.theta_dot
+    rows.row[[layout.P_X, layout.P_Y]] = moment.p
+    rows.row[[layout.V_X, layout.V_Y]] = moment.p_dot
+    rows.row[[layout.DEFLECTION, layout.DEFLECTION_RATE]] = moment.reference
+    rows.forces()[:] = moment.thrust
     simulation.restore(snapshot)
 
 
@@ -179,12 +177,17 @@ def accelerations(
     return np.linalg.solve(M, force)
 
 
-def _row(rows: Array, index: int) -> Array:
-    lanes = rows.shape[2]
-    return rows[index // lanes, :, index % lanes]
+class _Rows:
+    """The numbers of one robot in the blocks of a simulation, as views."""
 
+    def __init__(self, robot: Robot, blocks: Array, index: int) -> None:
+        lanes = blocks.shape[2]
+        self.robot = robot
+        self.row = blocks[index // lanes, :, index % lanes]
 
-def _tables(robot: Robot, row: Array) -> tuple[Array, Array]:
-    split = layout.HEADER + robot.links * layout.RECORD
-    links = row[layout.HEADER : split].reshape(robot.links, layout.RECORD)
-    return links, row[split:].reshape(-1, layout.THRUSTER)
+    def links(self, quantity: int) -> Array:
+        first = layout.HEADER + quantity * layout.padded(self.robot.links)
+        return self.row[first : first + self.robot.links]
+
+    def forces(self) -> Array:
+        return self.row[-len(self.robot.thrusters) :]

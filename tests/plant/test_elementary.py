@@ -26,9 +26,10 @@ def sines(x: Array, s: Array, c: Array) -> None:
 
 @numba.njit
 def sines_in_lanes(blocks: Array) -> None:
+    like = spread(0.0)
     for k in range(blocks.shape[0]):
-        block = block_at(blocks, k)
-        s, c = sincos(load(block, 0, spread(0.0)))
+        block = block_at(blocks, k, like)
+        s, c = sincos(load(block, 0, like))
         store(block, 1, s)
         store(block, 2, c)
 

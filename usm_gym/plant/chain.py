@@ -293,9 +293,13 @@ def substitute(block, like, i, side, links, l, motion):
     )
     store(block, row_of(ALPHA, links) + i, alpha)
     half_x, half_y = half_link(block, like, i, links, alpha, side * l)
-    centre_x = q_x - half_x
-    centre_y = q_y - half_y
-    return alpha, centre_x - half_x, centre_y - half_y, sum_x + centre_x, sum_y + centre_y
+    return (
+        alpha,
+        q_x - 2.0 * half_x,
+        q_y - 2.0 * half_y,
+        sum_x + (q_x - half_x),
+        sum_y + (q_y - half_y),
+    )
 
 
 @piece

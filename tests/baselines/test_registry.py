@@ -1,0 +1,135 @@
+"""Policies are made by name, from nominal knowledge and nothing else."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+import baselines
+from baselines import registry
+from usm_gym import Water
+from usm_gym.nominal import Nominal, nominal_of
+from usm_gym.scenario import PRESETS, named, sample
+
+SCRIPTED = ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero")
+
+
+@pytest.fixture(autouse=True)
+def _registry_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
+
+
+class Probe:
+    """A policy that keeps what it was made from."""
+
+    def __init__(self, *args: Any, **gains: Any) -> None:
+        self.args = args
+        self.gains = gains
+
+    def predict(self, observation: Any, state: Any = None, *_: Any, **__: Any) -> Any:
+        return np.zeros(5, np.float32), state
+
+
+def test_the_scripted_policies_are_there() -> None:
+    assert set(SCRIPTED) <= set(baselines.ids())
+    assert len(set(baselines.ids())) == len(baselines.ids())
+    for id in SCRIPTED:
+        assert not registry.entry(id).privileged
+        assert "\n" not in registry.entry(id).summary
+
+
+def test_an_unknown_name_is_answered_with_those_there_are() -> None:
+    env = gym.make("USM-Operation-v0")
+    with pytest.raises(ValueError, match="stb") as error:
+        baselines.make("stb", env)
+    for id in baselines.ids():
+        assert id in str(error.value)
+
+
+def test_a_name_is_given_once() -> None:
+    baselines.register("mine", Probe, "a probe")
+    with pytest.raises(ValueError, match="mine"):
+        baselines.register("mine", Probe, "another")
+    with pytest.raises(ValueError, match="sta"):
+        baselines.register("sta", Probe, "an impostor")
+    assert baselines.ids()[-1] == "mine"
+    assert registry.entry("mine").summary == "a probe"
+
+
+def test_a_registration_is_forgotten_after_its_test() -> None:
+    assert "mine" not in baselines.ids()
+
+
+def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
+    baselines.register("mine", Probe, "a probe")
+    env = gym.make("USM-Operation-v0", conditions="rough")
+    env.reset(seed=0)
+    policy: Any = baselines.make("mine", env, k_p=3.0)
+    (nominal,) = policy.args
+    assert type(nominal) is Nominal
+    assert policy.gains == {"k_p": 3.0}
+    assert {field.name for field in fields(nominal)} == {
+        "robot",
+        "control_period",
+        "thruster_time_constant",
+        "position_noise",
+    }
+    assert nominal.robot == env.unwrapped.robot
+    assert nominal.control_period == 0.02
+    assert nominal.thruster_time_constant == 0.1
+    assert nominal.position_noise == 2e-4
+
+
+def test_nominal_knowledge_tells_no_water_from_another() -> None:
+    robot = gym.make("USM-Operation-v0").unwrapped.robot
+    rng = np.random.default_rng(0)
+    rough = {nominal_of(robot, sample("operation", PRESETS["rough"], rng)) for _ in range(5)}
+    assert len(rough) == 1
+    wild = replace(
+        named("nominal", "operation"), water=Water(current=(0.1, 0.1), coefficients=(1.5,) * 6)
+    )
+    assert nominal_of(robot, wild) == nominal_of(robot, named("nominal", "operation"))
+
+
+def test_environments_may_be_wrapped_vectorised_or_left_out() -> None:
+    env = gym.make("USM-Operation-v0", conditions="rough")
+    expected = env.unwrapped.nominal
+    wrapped = gym.wrappers.TimeLimit(env, 10)
+    vector = DummyVecEnv([lambda: gym.make("USM-Operation-v0", conditions="rough")] * 2)
+    for given in (env, env.unwrapped, wrapped, vector, expected):
+        made: Any = baselines.make("sta", given)
+        assert made.nominal == expected
+    for wrong in (gym.make("CartPole-v1"), None, "USM-Operation-v0"):
+        with pytest.raises(ValueError, match="env"):
+            baselines.make("sta", wrong)
+
+
+@pytest.mark.parametrize("id", SCRIPTED)
+def test_unknown_and_impossible_gains_are_named(id: str) -> None:
+    nominal = gym.make("USM-Operation-v0").unwrapped.nominal
+    with pytest.raises(ValueError, match="k_q"):
+        baselines.make(id, nominal, k_q=1.0)
+    if id == "zero":
+        return
+    for wrong in (-1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="heading_gain"):
+            baselines.make(id, nominal, heading_gain=wrong)
+    with pytest.raises(ValueError, match="heading_gain"):
+        baselines.make(id, nominal, heading_gain="stiff")
+    with pytest.raises(ValueError, match="observer_gain"):
+        baselines.make(id, nominal, observer_gain=0.0)
+
+
+@pytest.mark.parametrize("id", SCRIPTED[:-1])
+def test_gains_are_taken(id: str) -> None:
+    nominal = gym.make("USM-Operation-v0").unwrapped.nominal
+    given: Any = baselines.make(id, nominal, heading_gain=1, observer_gain=20.0)
+    default: Any = baselines.make(id, nominal)
+    assert given.gains == default.gains._replace(heading_gain=1.0, observer_gain=20.0)
+    observation = np.zeros(90, np.float32)
+    observation[-1], observation[-7] = 1.0, 2.0  # thruster limit, heading error
+    moments = [policy.predict(observation)[0][1:] for policy in (given, default)]
+    np.testing.assert_allclose(moments[1], 100.0 * moments[0], rtol=1e-5)
