@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from baselines.observer import observe, observer_gains
 from baselines.pd import PDGains, pd_force
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
-from usm_gym.plant.chain import kinematics, row_of
+from usm_gym.plant.chain import kinematics
 from usm_gym.plant.compile import compiled
 from usm_gym.plant.lanes import WIDTH, block_at, spread
 from usm_gym.plant.layout import *
@@ -119,7 +119,7 @@ def closed_loop(blocks, plant, mass, law, every, record):
     cosine = row[row_of(COS, links) : row_of(COS, links) + links]
     theta = row[row_of(THETA, links) : row_of(THETA, links) + links]
     thrusters = plant.thruster_links.size
-    commands = row[row_of(QUANTITIES, links) : row_of(QUANTITIES, links) + thrusters]
+    commands = row[first_command(links) : first_command(links) + thrusters]
     T = np.empty((3, thrusters))
     sta = law.reading == SUPER_TWISTING
     gains = law.super_twisting

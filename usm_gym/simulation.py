@@ -109,14 +109,14 @@ class Simulation:
     @property
     def command(self) -> NDArray[np.float64]:
         """Last thruster commands after saturation, N, (size, thrusters)."""
-        first = rows.first_thruster(self.robot.links)
+        first = rows.first_command(self.robot.links)
         return self._columns(first, len(self.robot.thrusters))
 
     @property
     def theta(self) -> NDArray[np.float64]:
         """True link angles, rad, (size, links)."""
         links = self.robot.links
-        return self._columns(rows.HEADER + rows.THETA * rows.padded(links), links)
+        return self._columns(rows.row_of(rows.THETA, links), links)
 
     @property
     def position(self) -> NDArray[np.float64]:
@@ -268,10 +268,10 @@ class Simulation:
         row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
         row[rows.JOINT_INERTIA] = implicit * k_d + implicit**2 * k_p
         motion = scenario.inspection
-        links, stride = self.robot.links, rows.padded(self.robot.links)
-        share = rows.HEADER + rows.SHARE * stride + links - 1 - motion.bending_joints
+        links = self.robot.links
+        share = rows.row_of(rows.SHARE, links) + links - 1 - motion.bending_joints
         row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
-        side = rows.HEADER + rows.SIDE * stride
+        side = rows.row_of(rows.SIDE, links)
         row[side : side + links] = rows.sides(links)
         row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(
             motion.filter_frequency or 0.0, h

@@ -39,18 +39,6 @@ class Body(NamedTuple):
 
 
 @piece
-def row_of(quantity, links):
-    """First row of a quantity of the links."""
-    return HEADER + quantity * padded_rows(links)
-
-
-@piece
-def padded_rows(links):
-    """`layout.padded`, for kernels."""
-    return (links + WIDTH - 1) // WIDTH * WIDTH
-
-
-@piece
 def kinematics(block, like, wide, stride, links, l):
     """Sine and cosine of every angle, and every link's velocity relative to the tail end.
 
@@ -117,7 +105,7 @@ def own_answers(block, like, wide, stride, links, base, body):
     of the link and the linear acceleration q of the point it gives the moment r - a alpha - b . q
     and the force (r_x, r_y) - b alpha - C q.
     """
-    rows = padded_rows(links)
+    rows = padded(links)
     own = row_of(OWN, links)
     coefficients = (
         load(block, C_T, like),
@@ -169,7 +157,7 @@ def axes(block, like, i, links):
 @piece
 def with_own(block, like, i, links, answer):
     """The sum of an answer and link i's own."""
-    rows = padded_rows(links)
+    rows = padded(links)
     own = row_of(OWN, links) + i
     a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
     return (
@@ -192,14 +180,17 @@ def shifted(l, s, c, omega, answer):
     q = q_new - l alpha n + l omega^2 t makes it an answer to the acceleration of the new point.
     """
     a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
-    centripetal = l * (omega * omega)
-    r_x = r_x - centripetal * (c_xx * c + c_xy * s)
-    r_y = r_y - centripetal * (c_xy * c + c_yy * s)
-    r = r - centripetal * (b_x * c + b_y * s) - l * (r_y * c - r_x * s)
-    # b - l C n and a - 2 l b.n + l^2 n.C n, with n = (-s, c).
-    moved_x = b_x - l * (c_xy * c - c_xx * s)
-    moved_y = b_y - l * (c_yy * c - c_xy * s)
-    a = a - l * ((b_y + moved_y) * c - (b_x + moved_x) * s)
+    # l t and l omega^2 t first: they depend on no answer, on which all else here has to wait.
+    along_x, along_y = l * c, l * s
+    square = omega * omega
+    pull_x, pull_y = square * along_x, square * along_y
+    r_x = r_x - (c_xx * pull_x + c_xy * pull_y)
+    r_y = r_y - (c_xy * pull_x + c_yy * pull_y)
+    r = (r - (b_x * pull_x + b_y * pull_y)) - (r_y * along_x - r_x * along_y)
+    # b - l C n and a - 2 l b.n + l^2 n.C n, with l n = (-along_y, along_x).
+    moved_x = b_x - (c_xy * along_x - c_xx * along_y)
+    moved_y = b_y - (c_yy * along_x - c_xy * along_y)
+    a = a - ((b_y + moved_y) * along_x - (b_x + moved_x) * along_y)
     return a, moved_x, moved_y, c_xx, c_xy, c_yy, r, r_x, r_y
 
 
@@ -209,7 +200,7 @@ def eliminate(block, like, i, side, links, l, answer):
 
     `side` is 1.0 for a link between tail and root, -1.0 for one between root and head.
     """
-    rows = padded_rows(links)
+    rows = padded(links)
     sub = row_of(SUB_0, links) + i
     joint = row_of(TORQUE, links) + (i if side > 0.0 else i - 1)
     s, c, omega = axes(block, like, i, links)
@@ -271,8 +262,9 @@ def solve_root(block, like, root, links, l, tail, head):
 def half_link(block, like, i, links, alpha, l):
     """Acceleration of link i's head end relative to its centre: l (alpha n - omega^2 t)."""
     s, c, omega = axes(block, like, i, links)
+    along_x, along_y = l * c, l * s
     square = omega * omega
-    return -l * (alpha * s + square * c), l * (alpha * c - square * s)
+    return -square * along_x - alpha * along_y, alpha * along_x - square * along_y
 
 
 @piece
@@ -282,14 +274,11 @@ def substitute(block, like, i, side, links, l, motion):
     `motion` is (alpha of the neighbour, acceleration q of the joint between the two, sum of the
     accelerations of all link centres so far); returned is the same for the next link.
     """
-    rows = padded_rows(links)
+    rows = padded(links)
     sub = row_of(SUB_0, links) + i
     alpha, q_x, q_y, sum_x, sum_y = motion
-    alpha = (
-        load(block, sub, like)
-        + load(block, sub + rows, like) * alpha
-        - load(block, sub + 2 * rows, like) * q_x
-        - load(block, sub + 3 * rows, like) * q_y
+    alpha = (load(block, sub, like) + load(block, sub + rows, like) * alpha) - (
+        load(block, sub + 2 * rows, like) * q_x + load(block, sub + 3 * rows, like) * q_y
     )
     store(block, row_of(ALPHA, links) + i, alpha)
     half_x, half_y = half_link(block, like, i, links, alpha, side * l)

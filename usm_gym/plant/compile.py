@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numba.extending
 import platformdirs
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -52,6 +53,12 @@ def piece(function: F) -> F:
     """Compile a part of kernels, for use within `compiled` functions only."""
     part: F = numba.njit(fastmath=FLAGS, error_model="numpy", forceinline=True)(function)
     return part
+
+
+def shared(function: F) -> F:
+    """Let kernels call a plain Python function, which stays one for everybody else."""
+    kept: F = numba.extending.register_jitable(function)
+    return kept
 
 
 @lru_cache

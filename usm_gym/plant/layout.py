@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.plant.compile import shared
 from usm_gym.plant.lanes import WIDTH
 
 # Physics steps since the start, as a float. Position, velocity, acceleration of the centre of mass.
@@ -53,9 +54,22 @@ SUB_0, SUB_K, SUB_X, SUB_Y = range(OWN, OWN + 4)
 QUANTITIES = OWN + 9
 
 
+@shared
 def padded(links: int) -> int:
     """Rows that each quantity of the links takes."""
-    return -(-links // WIDTH) * WIDTH
+    return (links + WIDTH - 1) // WIDTH * WIDTH
+
+
+@shared
+def row_of(quantity: int, links: int) -> int:
+    """Row of a quantity of the first link."""
+    return HEADER + quantity * padded(links)
+
+
+@shared
+def first_command(links: int) -> int:
+    """Row of the first thruster's command; the thrusters' forces follow the commands."""
+    return row_of(QUANTITIES, links)
 
 
 def sides(links: int) -> NDArray[np.float64]:
@@ -63,11 +77,6 @@ def sides(links: int) -> NDArray[np.float64]:
     return np.sign(links // 2 - np.arange(links)).astype(np.float64)
 
 
-def first_thruster(links: int) -> int:
-    """Row of the first thruster's command; the thrusters' forces follow the commands."""
-    return HEADER + QUANTITIES * padded(links)
-
-
 def rows(links: int, thrusters: int) -> int:
     """Number of rows of a block for robots of `links` links and `thrusters` thrusters."""
-    return first_thruster(links) + 2 * thrusters
+    return first_command(links) + 2 * thrusters

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.chain import row_of
 from usm_gym.plant.compile import piece
 from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
@@ -72,7 +71,7 @@ def command(row, lanes, lane, links, action):
     effort = 0.0
     for j in range(action.size):
         share = min(max(float(action[j]), -1.0), 1.0)
-        row[(row_of(QUANTITIES, links) + j) * lanes + lane] = share * limit
+        row[(first_command(links) + j) * lanes + lane] = share * limit
         effort += abs(share * limit)
     return effort / action.size
 
@@ -150,7 +149,7 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
     observation[k] = heading_error / scale[k]
 
     limit = row[LIMIT * lanes + lane]
-    commands = row_of(QUANTITIES, links)
+    commands = first_command(links)
     k = starts[THRUSTER_COMMAND]
     for j in range(starts[THRUSTER_LIMIT] - k):
         observation[k + j] = row[(commands + j) * lanes + lane] / limit / scale[k + j]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.chain import Body, accelerate, kinematics, row_of
+from usm_gym.plant.chain import Body, accelerate, kinematics
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
@@ -111,7 +111,7 @@ def push(block, like, plant):
         store(block, along + plant.thruster_links[j], like)
         store(block, across + plant.thruster_links[j], like)
     lag = load(block, LAG, like)
-    commands = row_of(QUANTITIES, links)
+    commands = first_command(links)
     forces = commands + thrusters
     for j in range(thrusters):
         force = load(block, forces + j, like)
