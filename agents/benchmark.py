@@ -16,8 +16,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from baselines.paper_rate import Law, simulate
 from baselines.registry import make
-from baselines.reproduction import Law, simulate
 from usm_gym.evaluation import evaluate
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot, Thruster

@@ -6,20 +6,21 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 
-from agents.commands import bench, evaluate, policies
+from agents.commands import bench, evaluate, policies, reproduce
 from agents.terminal import Parser
-from usm_gym import __version__
 from usm_gym.validation import in_one_line
 
-COMMANDS = (policies, evaluate, bench)
+COMMANDS = (policies, evaluate, reproduce, bench)
 
 DESCRIPTION = """\
-Trajectory tracking for an underwater swimming manipulator: score controllers, compare them, train
-residual agents. A first look, in half a minute:
+Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
+A first look, in half a minute:
 
   usm evaluate                 every policy on the fifty frozen operation scenarios
   usm policies                 what there is to compare
+  usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here
 """
 
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"usm-gym {__version__}")
+    parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:
         command.add_to(subparsers)

@@ -96,8 +96,8 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
         )
         self._plain: USMEnv = env.unwrapped  # type: ignore[assignment]
         self._scale = float(residual_scale)
-        self._base_id = base
-        self._base = make(base, env) if isinstance(base, str) else base
+        self._make_base = lambda: make(base, env) if isinstance(base, str) else base
+        self._make_base()  # so that an unknown base is refused here
         self.observation_space = residual_space(self._plain.layout)
 
     def reset(
@@ -105,9 +105,8 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
     ) -> tuple[Array, dict[str, Any]]:
         """Start an episode of the plain environment and of the base."""
         observation, info = self.env.reset(seed=seed, options=options)
-        if isinstance(self._base_id, str):
-            # The scenario may have brought its own control period.
-            self._base = make(self._base_id, self.env)
+        # Made anew, because the scenario may have brought its own control period.
+        self._base = self._make_base()
         self._state: Any = None
         return self._observe(observation, start=True), info
 
@@ -120,6 +119,15 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
         observation, reward, terminated, truncated, info = self.env.step(command)
         seen = self._observe(observation, start=False)
         return seen, float(reward), terminated, truncated, info
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Copy the whole state, the base's included."""
+        return self._plain.snapshot(), self._observation, self._action, self._state
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
+        """Return to a snapshot."""
+        plain, self._observation, self._action, self._state = snapshot
+        self._plain.restore(plain)
 
     def _observe(self, observation: Array, start: bool) -> Array:
         self._observation = observation

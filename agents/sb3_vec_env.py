@@ -33,17 +33,16 @@ class SB3VecEnv(VecEnv):
         Raises:
             ValueError: If it is none of this package, or restarts episodes otherwise.
         """
-        inner = envs.unwrapped
-        require(isinstance(inner, USMVectorEnv), "envs", envs, "a USMVectorEnv")
-        assert isinstance(inner, USMVectorEnv)
+        require(isinstance(envs, USMVectorEnv), "envs", envs, "a USMVectorEnv, not wrapped")
+        assert isinstance(envs, USMVectorEnv)
         require(
-            inner.autoreset_mode is AutoresetMode.SAME_STEP,
+            envs.autoreset_mode is AutoresetMode.SAME_STEP,
             "autoreset_mode",
-            inner.autoreset_mode.value,
+            envs.autoreset_mode.value,
             f"{AutoresetMode.SAME_STEP.value!r}",
         )
-        self._envs = inner
-        super().__init__(inner.num_envs, inner.single_observation_space, inner.single_action_space)
+        self._envs = envs
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
         self._begin = time.time()
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)

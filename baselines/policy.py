@@ -185,9 +185,10 @@ class ScriptedPolicy:
             ValueError: If a gain is negative or not finite.
         """
         for name, gain in gains._asdict().items():
-            require(np.isfinite(gain) and gain >= 0, name, gain, "a finite number >= 0")
+            number = isinstance(gain, (int, float)) and np.isfinite(gain) and gain >= 0
+            require(number, name, gain, "a finite number >= 0")
         self.nominal = nominal
-        self.gains = gains
+        self.gains = type(gains)(*map(float, gains))
         self._model = model_of(nominal)
         self._thrusters = len(nominal.robot.thrusters)
 

@@ -10,6 +10,7 @@ from baselines.observer import check_observer, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
+from usm_gym.validation import require
 
 
 class SuperTwistingGains(NamedTuple):
@@ -137,6 +138,12 @@ class SuperTwisting(ScriptedPolicy):
         """Take gains other than the paper's by name, see `SuperTwistingGains`."""
         super().__init__(nominal, SuperTwistingGains(**gains))
         check_observer(self.gains.observer_gain, self.gains.k2_exponent)
+        require(
+            self.gains.beta_offset + self.gains.epsilon > 0,
+            "beta_offset",
+            self.gains.beta_offset,
+            "a number > 0 where epsilon is 0, for beta to be positive",
+        )
         self._implicit = implicit
 
     def force(self, signals: Signals, law_state: Array) -> Array:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.plant import layout
 from usm_gym.plant.chain import Body, accelerate_one
-from usm_gym.robot import Robot
+from usm_gym.robot import Hydrodynamics, Robot
 from usm_gym.validation import require
 
-Hydrodynamics = Literal["consistent", "kelasidi2014"]
-HYDRODYNAMICS: tuple[Hydrodynamics, ...] = ("consistent", "kelasidi2014")
+HYDRODYNAMICS: tuple[Hydrodynamics, ...] = get_args(Hydrodynamics)
 
 
 def accelerations(

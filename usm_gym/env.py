@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.reward import reward, reward_of_loss
-from usm_gym.robot import Robot
+from usm_gym.robot import Robot, robot_of
 from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named, sample
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.validation import require
@@ -84,6 +84,7 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     |---|---|---|
     | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of `Conditions` fields |
     | `robot` | the paper's | a dict of `Robot` fields |
+    | `render_mode` | None | no pictures yet |
 
     ## Version history
 
@@ -107,12 +108,13 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
         require(render_mode is None, "render_mode", render_mode, "None")
         self.mode = mode
         self.conditions = conditions_of(conditions)
-        self.robot = robot if isinstance(robot, Robot) else Robot(**(robot or {}))
+        self.robot = robot_of(robot)
         self.render_mode = render_mode
         self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
         self.observation_space = self.layout.space
         self.action_space = action_space(self.robot)
         self._simulation: Simulation | None = None
+        self._over = False
 
     @property
     def nominal(self) -> Nominal:
@@ -143,6 +145,7 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         scenario = scenario_of(options, self.mode, self.conditions, self.robot, self.np_random)
         self._simulation = Simulation(self.robot, [scenario])
+        self._over = False
         return self._simulation.observation[0].copy(), self._info()
 
     def step(
@@ -151,12 +154,16 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
         """Hold the thruster commands for one control period.
 
         Raises:
-            ValueError: If the action has the wrong shape or is not finite.
+            ValueError: If the action has the wrong shape or a NaN in it.
+            gymnasium.error.ResetNeeded: If the episode is over.
         """
         simulation = self._running
+        if self._over:
+            raise gym.error.ResetNeeded("the episode is over: call reset()")
         batch = checked_action(action, (len(self.robot.thrusters),))[np.newaxis]
         simulation.step(batch)
         rewards, terminated, truncated = outcome(simulation)
+        self._over = bool(terminated[0] or truncated[0])
         return (
             simulation.observation[0].copy(),
             float(rewards[0]),
@@ -171,8 +178,10 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot; equal actions then have equal consequences, to the bit."""
-        self._simulation = Simulation(self.robot, list(snapshot.scenarios))
+        self._simulation = Simulation(self.robot, snapshot.scenarios)
         self._simulation.restore(snapshot)
+        _, terminated, truncated = outcome(self._simulation)
+        self._over = bool(terminated[0] or truncated[0])
 
     @property
     def _running(self) -> Simulation:
@@ -196,11 +205,11 @@ def action_space(robot: Robot) -> gym.Space[NDArray[np.float32]]:
 
 
 def checked_action(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """The action as float32, or an error that says what is wrong with it."""
+    """The action as float32 in [-1, 1], or an error that says what is wrong with it."""
     array = np.asarray(action, np.float32)
     require(array.shape == shape, "the action's shape", array.shape, f"{shape}")
     require(not np.isnan(array).any(), "action", action, "numbers, not NaN")
-    return array
+    return np.clip(array, -1.0, 1.0)
 
 
 def scenario_of(
@@ -218,7 +227,7 @@ def scenario_of(
     if wanted is None:
         return sample(mode, conditions, stream, robot.links - 1)
     if isinstance(wanted, str):
-        return named(wanted, mode, conditions)
+        return named(wanted, mode, conditions, robot.links - 1)
     scenario = wanted if isinstance(wanted, Scenario) else Scenario.from_dict(wanted)
     require(scenario.mode == mode, "the scenario's mode", scenario.mode, repr(mode))
     return scenario

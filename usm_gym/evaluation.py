@@ -88,7 +88,7 @@ def evaluate(
 
     Args:
         policy: Anything with `predict`; it is called with a batch axis. To be pickled for more than
-            one worker.
+            one worker. One with `privileged = True` is also given `snapshot=`, the true state.
         scenarios: The episodes.
         robot: The robot; without one, the paper's.
         workers: Number of processes; without effect on the result.
@@ -105,6 +105,8 @@ def evaluate(
     require(workers >= 1, "workers", workers, "1 or more")
     report = progress or (lambda episodes: None)
     body = robot or Robot()
+    for scenario in scenarios:
+        score(_at_rest(scenario, body))  # refuses an episode that leaves nothing to score
     if workers == 1:
         rows = [score(each) for each in rollout(policy, scenarios, body, report)]
     else:
@@ -181,9 +183,20 @@ def _run(
     ends = simulation.steps.copy()
     lost = np.zeros(size, bool)
     state: Any = None
-    start = np.ones(size, bool)
+    known = getattr(policy, "nominal", None)
+    period = scenarios[0].conditions.control_period
+    if known is not None:
+        require(
+            known.control_period == period,
+            "control_period",
+            period,
+            f"that for which the policy was made, {known.control_period}",
+        )
     for k in range(length):
-        action, state = policy.predict(simulation.observation, state, start, deterministic=True)
+        truth = {"snapshot": simulation.snapshot()} if getattr(policy, "privileged", False) else {}
+        start = np.full(size, k == 0)
+        seen = simulation.observation.copy()
+        action, state = policy.predict(seen, state, start, deterministic=True, **truth)
         action = np.asarray(action, np.float32)
         require(
             action.shape == (size, thrusters),
@@ -192,20 +205,18 @@ def _run(
             f"({size}, {thrusters})",
         )
         alive = (k < ends) & ~lost
-        require(np.isfinite(action[alive]).all(), "the policy's action", "NaN", "numbers")
-        simulation.step(np.nan_to_num(action))
+        require(not np.isnan(action[alive]).any(), "the policy's action", "NaN", "numbers")
+        simulation.step(np.clip(np.nan_to_num(action), -1.0, 1.0))
         error[k], heading[k] = simulation.error, simulation.heading_error
         command[k] = simulation.command
         now = simulation.lost & alive
         ends[now] = k + 1
         lost |= now
-        start[:] = False
         if k % 100 == 99 or k == length - 1:
             progress(size * (k % 100 + 1) / length)
             if lost.all():
                 progress(size * (length - 1 - k) / length)
                 break
-    period = scenarios[0].conditions.control_period
     return [
         Trajectory(
             scenario=scenario,
@@ -217,6 +228,18 @@ def _run(
         )
         for i, (scenario, end) in enumerate(zip(scenarios, ends, strict=True))
     ]
+
+
+def _at_rest(scenario: Scenario, robot: Robot) -> Trajectory:
+    samples = scenario.steps
+    return Trajectory(
+        scenario=scenario,
+        time=np.arange(1, samples + 1, dtype=np.float64) * scenario.conditions.control_period,
+        error=np.zeros((samples, 2)),
+        heading_error=np.zeros(samples),
+        command=np.zeros((samples, len(robot.thrusters))),
+        lost=False,
+    )
 
 
 def _score_all(

@@ -13,6 +13,7 @@ from usm_gym.validation import require
 RECOVERY = 7.0
 # Further from its reference than this in either axis a robot is lost, and counts at least this, m.
 LOST_ERROR = 0.5
+TIME_TOLERANCE = 1e-9
 
 
 def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
@@ -88,7 +89,9 @@ def _checked(
     times, errors = np.asarray(time, np.float64), np.asarray(error, np.float64)
     require(times.ndim == 1, "time", times.shape, "one dimension")
     require(errors.shape == (times.size, 2), "error", errors.shape, f"shape ({times.size}, 2)")
+    require(np.isfinite(times).all(), "time", "not finite", "finite numbers")
     require(np.isfinite(errors).all(), "error", "not finite", "finite numbers")
-    late = times >= settle_time
+    # Sample times are multiples of a period and may fall short of a decimal by rounding.
+    late = times >= settle_time - TIME_TOLERANCE
     require(late.any(), "settle_time", settle_time, "a time before the last sample")
     return times, errors, late

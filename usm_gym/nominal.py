@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from usm_gym.robot import Robot
@@ -28,8 +29,13 @@ class Nominal:
 def nominal_of(robot: Robot, scenario: Scenario) -> Nominal:
     """The nominal knowledge that goes with a scenario."""
     conditions = scenario.conditions
+    stiffness, damping = scenario.joint_stiffness, scenario.joint_damping
     return Nominal(
-        robot=robot,
+        robot=dataclasses.replace(
+            robot,
+            joint_stiffness=robot.joint_stiffness if stiffness is None else stiffness,
+            joint_damping=robot.joint_damping if damping is None else damping,
+        ),
         control_period=conditions.control_period,
         thruster_time_constant=conditions.thruster_time_constant,
         position_noise=conditions.position_noise,

@@ -94,7 +94,7 @@ class ObservationLayout:
                 thrusters,
                 "1",
                 1.0,
-                1.0,
+                1.1,
                 "last command over the thruster limit, after saturation",
             ),
             Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest force of a thruster"),

@@ -37,7 +37,7 @@ def reward(
 
 def reward_of_loss(remaining: NDArray[np.int64]) -> NDArray[np.float64]:
     """Reward of the step that loses the robot: the worst for it and for all remaining steps."""
-    return np.asarray(WORST * (1.0 + remaining), np.float64)
+    return np.asarray(WORST * (1.0 + np.maximum(remaining, 0)), np.float64)
 
 
 @compiled

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from pydantic.dataclasses import dataclass
 from usm_gym.validation import CONFIG, Count, NonNegative, Positive, require
 
 Direction = Literal["axial", "normal"]
+# Forms of the added mass, docs/model.md section 3.
+Hydrodynamics = Literal["consistent", "kelasidi2014"]
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -185,9 +188,22 @@ class Robot:
     @property
     def thruster_is_normal(self) -> NDArray[np.bool_]:
         """Whether each thruster pushes across its link, bool, shape (thrusters,)."""
-        return np.array([thruster.direction == "normal" for thruster in self.thrusters])
+        return np.array([each.direction == "normal" for each in self.thrusters], dtype=np.bool_)
 
     def _straight_allocation(self) -> NDArray[np.float64]:
         normal = self.thruster_is_normal
         position = 2 * self.thruster_links - (self.links - 1)
         return np.stack([~normal, normal, normal * position]).astype(np.float64)
+
+
+def robot_of(value: Mapping[str, Any] | Robot | None) -> Robot:
+    """A robot from the fields that differ from the paper's.
+
+    Raises:
+        ValueError: If a field is unknown or its value not allowed.
+    """
+    if isinstance(value, Robot):
+        return value
+    fields = {} if value is None else value
+    require(isinstance(fields, Mapping), "robot", value, "a Robot or a dict of its fields")
+    return Robot(**fields)

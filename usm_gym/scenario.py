@@ -9,12 +9,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import Field, TypeAdapter
+from pydantic import Field, Strict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
+from usm_gym.plant.layout import MAX_SHIFTS
+from usm_gym.robot import Hydrodynamics
 from usm_gym.validation import CONFIG, Count, NonNegative, Number, Positive, Switch, require
 
 Mode = Literal["operation", "torpedo"]
@@ -65,10 +67,10 @@ class Inspection:
     def __post_init__(self) -> None:
         """Refuse times that do not rise or do not match the deflections."""
         require(
-            len(self.times) == len(self.deflections) <= 8,
+            len(self.times) == len(self.deflections) <= MAX_SHIFTS,
             "deflections",
             self.deflections,
-            "as many as times, 8 at most",
+            f"as many as times, {MAX_SHIFTS} at most",
         )
         rising = all(a < b for a, b in zip(self.times, self.times[1:], strict=False))
         require(rising, "times", self.times, "rising times")
@@ -90,7 +92,7 @@ class Conditions:
             forward method, stable with the default joint gains only below about 1e-4 s.
         hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
         thruster_time_constant: First-order lag of the thrusters, s; 0 for none.
-        thruster_limit: Largest force of a thruster, N.
+        thruster_limit: Largest force of a thruster, N, up to 1000.
         position_noise: Standard deviation of the position measurement in each axis, m.
         current_limit: Largest constant current in each axis, m/s.
         current_variation: Largest amplitude of a sinusoidal current on top of it, m/s.
@@ -103,9 +105,9 @@ class Conditions:
     control_period: Positive = 0.02
     physics_step: Positive = 1e-3
     integrator: Literal["symplectic", "explicit"] = "symplectic"
-    hydrodynamics: Literal["consistent", "kelasidi2014"] = "consistent"
+    hydrodynamics: Hydrodynamics = "consistent"
     thruster_time_constant: NonNegative = 0.05
-    thruster_limit: Positive = 20.0
+    thruster_limit: Annotated[Positive, Field(le=1000)] = 20.0
     position_noise: NonNegative = 5e-5
     current_limit: NonNegative = 0.05
     current_variation: NonNegative = 0.0
@@ -209,7 +211,7 @@ class Scenario:
     water: Water = Water()
     duration: Positive = 40.0
     settle_time: NonNegative = 5.0
-    noise_seed: int = Field(default=0, ge=0)
+    noise_seed: Annotated[int, Strict(), Field(ge=0)] = 0
     joint_stiffness: NonNegative | None = None
     joint_damping: NonNegative | None = None
     heading: Literal["mean", "head"] = "mean"
@@ -258,6 +260,7 @@ class Scenario:
         Raises:
             ValueError: If a key is unknown, or a value of the wrong type or out of range.
         """
+        require(isinstance(data, Mapping), "scenario", data, "a dict of fields")
         return _ADAPTER.validate_python(dict(data))
 
 
@@ -346,28 +349,34 @@ def sample(
     )
 
 
-def named(name: str, mode: Mode, conditions: Conditions | None = None) -> Scenario:
+def named(
+    name: str, mode: Mode, conditions: Conditions | None = None, joints: int = 15
+) -> Scenario:
     """The scenario "nominal" or "table1" of a mode (docs/model.md section 9).
 
     Args:
         name: "nominal", or "table1", the scenario of the paper's Table 1.
         mode: "operation" or "torpedo".
         conditions: Its conditions; without them "field" for nominal and "ideal" for table1.
+        joints: Number of joints of the robot; eleven fifteenths of them bend.
     """
     require(name in ("nominal", "table1"), "scenario", name, "nominal, table1")
     torpedo = mode == "torpedo"
+    bending_joints = max(1, 11 * joints // 15)
     if name == "nominal":
         return Scenario(
             mode=mode,
             path=Path(speed=0.1) if torpedo else Path(),
-            inspection=STILL if torpedo else Inspection(),
+            inspection=STILL if torpedo else Inspection(bending_joints=bending_joints),
             conditions=conditions or FIELD,
             look_ahead=2.24 if torpedo else None,
         )
     return Scenario(
         mode=mode,
         path=Path(ramp=0.0),
-        inspection=STILL if torpedo else Inspection(filter_frequency=None),
+        inspection=STILL
+        if torpedo
+        else Inspection(bending_joints=bending_joints, filter_frequency=None),
         conditions=conditions or PRESETS["ideal"],
         joint_stiffness=9000.0,
         joint_damping=150.0,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.metrics import LOST_ERROR
+from usm_gym.metrics import LOST_ERROR, TIME_TOLERANCE
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Body
@@ -57,6 +57,8 @@ class Simulation:
         effort: Mean absolute thruster commands, N, (size,).
         lost: Which robots are lost: their error beyond `LOST_ERROR` or not finite, (size,).
         steps: Control periods in each episode, int64, (size,).
+        fleet: The state, as kernels take it.
+        plant: What all robots share, as kernels take it.
     """
 
     def __init__(self, robot: Robot, scenarios: Sequence[Scenario], threads: int = 1) -> None:
@@ -95,11 +97,6 @@ class Simulation:
         self._share_out()
         for index, scenario in enumerate(scenarios):
             self.start(index, scenario)
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        """Time since each start, s, (size,)."""
-        return np.asarray(self.count * self._timing[0], np.float64)
 
     @property
     def limit(self) -> NDArray[np.float64]:
@@ -149,7 +146,7 @@ class Simulation:
         self.max_error[index] = 0.0
         self.steps[index] = scenario.steps
         self._settled[index] = math.ceil(
-            scenario.settle_time / scenario.conditions.control_period - 1e-9
+            (scenario.settle_time - TIME_TOLERANCE) / scenario.conditions.control_period
         )
         self.effort[index] = 0.0
         self.lost[index] = False
@@ -162,7 +159,7 @@ class Simulation:
             self._moving_water |= moving
             self._share_out()
         self._noise[index, : len(noise)] = noise
-        observe_one(self._fleet, self._plant, self._table, index, self._lanes)
+        observe_one(self.fleet, self.plant, self._table, index, self._lanes)
 
     def step(self, action: NDArray[Any]) -> None:
         """Advance every robot by one control period.
@@ -172,7 +169,7 @@ class Simulation:
                 [-1, 1] saturate.
         """
         edges = np.linspace(0, len(self._rows), self._threads + 1, dtype=np.int64).tolist()
-        arguments = (self._fleet, self._plant, self._table, action)
+        arguments = (self.fleet, self.plant, self._table, action)
         others = [
             self._pool.submit(self._kernel, *arguments, first, last)
             for first, last in pairwise(edges[:-1])
@@ -220,7 +217,7 @@ class Simulation:
         """Gather what the kernel takes; arrays are shared, not copied."""
         conditions = self.scenarios[0].conditions
         implicit = conditions.physics_step if conditions.integrator == "symplectic" else 0.0
-        self._plant = Plant(
+        self.plant = Plant(
             body=Body(
                 l=self.robot.half_length,
                 m=self.robot.link_mass,
@@ -236,7 +233,7 @@ class Simulation:
             shifts=self._shifts,
             moving_water=self._moving_water,
         )
-        self._fleet = Fleet(
+        self.fleet = Fleet(
             blocks=self._rows.reshape(len(self._rows), -1),
             instant=self.count,
             noise=self._noise,
@@ -294,7 +291,7 @@ class Simulation:
 
     def _columns(self, first: int, count: int) -> NDArray[np.float64]:
         table = self._rows[:, first : first + count].swapaxes(1, 2)
-        return table.reshape(-1, count)[: self.size]
+        return table.reshape(-1, count)[: self.size].copy()
 
 
 _STATE = (

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from usm_gym.env import action_space, checked_action, infos, outcome, scenario_of
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
-from usm_gym.robot import Robot
+from usm_gym.robot import Robot, robot_of
 from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named
 from usm_gym.simulation import Simulation
 from usm_gym.validation import require
@@ -67,7 +67,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         self.num_envs = num_envs
         self.mode = mode
         self.conditions = conditions_of(conditions)
-        self.robot = robot if isinstance(robot, Robot) else Robot(**(robot or {}))
+        self.robot = robot_of(robot)
         self.threads = threads
         self.render_mode = render_mode
         self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -113,9 +113,9 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         indices = np.flatnonzero(which).tolist()
         scenarios = {i: self._draw(i, self._options_of(i, options)) for i in indices}
         if which.all():
-            ordered = [scenarios[i] for i in indices]
+            fresh = Simulation(self.robot, [scenarios[i] for i in indices], self.threads)
             self.close_extras()
-            self._simulation = Simulation(self.robot, ordered, self.threads)
+            self._simulation = fresh
         else:
             for index, scenario in scenarios.items():
                 self.simulation.start(index, scenario)
@@ -128,7 +128,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         """Hold the thruster commands of all robots for one control period.
 
         Raises:
-            ValueError: If the actions have the wrong shape or are not finite.
+            ValueError: If the actions have the wrong shape or a NaN in them.
             gymnasium.error.ResetNeeded: If, without autoreset, an episode has ended.
         """
         simulation = self.simulation

@@ -21,7 +21,7 @@ from usm_gym.robot import Robot
 from usm_gym.scenario import MODES, Conditions, Mode, Scenario, conditions_of, sample
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.suites import NAMES, suite
-from usm_gym.validation import require
+from usm_gym.validation import in_one_line, require
 
 DESCRIPTION = """\
 Score policies: per episode and axis, the largest true position error after settling (5 s), as in
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
     conditions = None if arguments.conditions is None else parse_conditions(arguments.conditions)
     scenarios = chosen_scenarios(arguments, conditions)
     robot = Robot()
-    policies = chosen_policies(arguments.policies, robot, scenarios[0])
+    policies = chosen_policies(arguments.policies, robot, scenarios)
     results: dict[str, Any] = {}
     with progress_bar() as bar:
         task = bar.add_task("", total=len(policies) * len(scenarios))
@@ -142,17 +142,22 @@ def read_suite(name: str) -> list[Scenario]:
     if not name.endswith(".json"):
         return suite(name)
     try:
-        data = json.loads(Path(name).read_text(encoding="utf-8"))
-        scenarios = [Scenario.from_dict(each) for each in data["scenarios"]]
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
-        raise ValueError(f"{name} is no suite: {error!r}") from error
-    require(len(scenarios) > 0, "scenarios", scenarios, "one or more")
+        listed = json.loads(Path(name).read_text(encoding="utf-8"))["scenarios"]
+        require(isinstance(listed, list) and listed, "scenarios", listed, "a list of one or more")
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{name} is no file of scenarios: {error!r}") from error
+    scenarios = []
+    for index, data in enumerate(listed):
+        try:
+            scenarios.append(Scenario.from_dict(data))
+        except ValueError as error:
+            raise ValueError(f"{name}, scenario {index}: {in_one_line(error)}") from error
     return scenarios
 
 
 def parse_conditions(text: str) -> Conditions:
     """Conditions from a preset's name or a JSON object."""
-    if not text.lstrip().startswith("{"):
+    if text.lstrip()[:1] not in ("{", "["):
         return conditions_of(text)
     try:
         return conditions_of(json.loads(text))
@@ -160,14 +165,17 @@ def parse_conditions(text: str) -> Conditions:
         raise ValueError(f"--conditions is {text!r}: no JSON ({error})") from error
 
 
-def chosen_policies(names: str | None, robot: Robot, scenario: Scenario) -> dict[str, Policy]:
-    """Policies by name, made from the nominal knowledge that goes with a scenario."""
+def chosen_policies(
+    names: str | None, robot: Robot, scenarios: list[Scenario]
+) -> dict[str, Policy]:
+    """Policies by name, made from the nominal knowledge that goes with the scenarios."""
     if names is None:
         chosen = [id for id in ids() if not (entry(id).slow or entry(id).privileged)]
     else:
         chosen = [name.strip() for name in names.split(",") if name.strip()]
     require(len(chosen) > 0, "--policies", names, "one name or more")
-    nominal = nominal_of(robot, scenario)
+    nominal, *others = {nominal_of(robot, scenario) for scenario in scenarios}
+    require(not others, "scenarios", f"{len(others) + 1} kinds", "one nominal knowledge for all")
     return {name: make(name, nominal) for name in chosen}
 
 

@@ -184,3 +184,20 @@ def test_a_closed_pipe_leaves_no_traceback():
         f"{USM} policies | true", shell=True, capture_output=True, text=True, check=False
     )
     assert answer.stderr == ""
+
+
+def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path):
+    (tmp_path / "file").write_text("")
+    answer = usm("reproduce", "--output", "file/folder", cwd=tmp_path)
+    assert answer.returncode == 2
+    assert answer.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [(("--rounds", "0"), "--rounds is 0"), (("--output", "missing/b.json"), "missing")],
+)
+def test_bench_refuses_bad_input(arguments, message, tmp_path):
+    answer = usm("bench", *arguments, cwd=tmp_path)
+    assert answer.returncode == 2
+    assert message in answer.stderr

@@ -55,6 +55,19 @@ def test_base_and_residual_are_saturated_once():
         np.testing.assert_allclose(observation[part], wanted, atol=2e-7)
 
 
+def test_a_snapshot_holds_the_base_too():
+    env = gym.make(ID, disable_env_checker=True).env
+    env.reset(seed=1)
+    actions = np.random.default_rng(0).uniform(-1, 1, (60, 5)).astype(np.float32)
+    for action in actions[:30]:
+        env.step(action)
+    snapshot = env.snapshot()
+    first = [env.step(action)[0] for action in actions[30:]]
+    env.restore(snapshot)
+    second = [env.step(action)[0] for action in actions[30:]]
+    assert (np.array(first) == np.array(second)).all()
+
+
 def test_arguments_survive_the_spec_and_bad_ones_are_refused():
     env = gym.make(ID, base="pd", residual_scale=3.0, conditions="rough")
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))

@@ -93,6 +93,7 @@ def test_joints_may_have_gains_of_the_scenario() -> None:
 
 BEND = Scenario(  # a smooth episode of everything that moves, but for the robot's commands
     duration=0.3,
+    settle_time=0.0,
     conditions=Conditions(
         control_period=0.1, thruster_time_constant=0.1, thruster_limit=20.0, position_noise=0.0
     ),

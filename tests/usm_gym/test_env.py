@@ -1,5 +1,6 @@
 """The environments as a user meets them: through `gym.make`."""
 
+import dataclasses
 import json
 import warnings
 
@@ -135,7 +136,7 @@ def test_gymnasiums_vector_environments_give_the_same_bits(vector):
 
 def test_snapshot_and_restore_repeat_the_same_bits():
     env = gym.make("USM-Operation-v0", conditions="rough")
-    actions = np.random.default_rng(1).uniform(-1, 1, (200, 5)).astype(np.float32)
+    actions = np.random.default_rng(1).uniform(-0.2, 0.2, (200, 5)).astype(np.float32)
     env.reset(seed=5)
     for action in actions[:100]:
         env.step(action)
@@ -165,6 +166,19 @@ def test_a_lost_robot_ends_the_episode_with_a_finite_observation_and_the_bill():
     assert env.observation_space.contains(observation)
     # Lost in step k, it is charged 10.1 for that step and for each of the 2000 - k that remain.
     assert rewards[-1] == pytest.approx(-10.1 * (1 + 2000 - len(rewards)))
+
+
+def test_an_episode_that_is_over_waits_for_reset():
+    scenario = dataclasses.replace(usm_gym.suite("operation")[0], duration=0.2, settle_time=0.1)
+    env = gym.make("USM-Operation-v0").unwrapped
+    env.reset(options={"scenario": scenario})
+    for _ in range(10):
+        *_, truncated, _ = env.step(np.zeros(5, np.float32))
+    assert truncated
+    with pytest.raises(gym.error.ResetNeeded, match="over"):
+        env.step(np.zeros(5, np.float32))
+    env.reset()
+    env.step(np.zeros(5, np.float32))
 
 
 def test_a_state_that_is_not_finite_is_reported():
@@ -215,6 +229,9 @@ def test_actions_beyond_the_bounds_saturate():
         ({"conditions": {"noise": 1.0}}, "noise"),
         ({"conditions": {"position_noise": -1.0}}, "greater than or equal to 0"),
         ({"robot": {"links": 1}}, "links is 1"),
+        ({"robot": {"thrusters": ()}}, "thrusters is \\(\\)"),
+        ({"robot": 3}, "robot is 3"),
+        ({"conditions": {"thruster_limit": 5000.0}}, "thruster_limit"),
         ({"render_mode": "holographic"}, "render_mode"),
     ],
 )
@@ -230,7 +247,9 @@ def test_bad_arguments_are_refused(arguments, message):
     [
         ({"scenario": "hard"}, "scenario is 'hard'; allowed: nominal, table1"),
         ({"scenarios": "nominal"}, "options"),
+        ({"scenario": 3}, "scenario is 3"),
         ({"scenario": {"mode": "torpedo"}}, "mode"),
+        ({"scenario": {"noise_seed": "7"}}, "noise_seed"),
         ({"scenario": {"path": {"speed": "fast"}}}, "speed"),
         ({"scenario": {"inspection": {"bending_joints": 16}}}, "bending_joints is 16"),
     ],
@@ -276,6 +295,8 @@ def test_other_robots_are_environments_too():
     ]
     env = gym.make("USM-Operation-v0", robot={"links": 4, "thrusters": thrusters})
     assert env.action_space.shape == (3,)
+    env.reset(options={"scenario": "nominal"})
+    assert env.unwrapped.scenario.inspection.bending_joints == 2
     assert rollout(env, 500)[-1][2]["diverged"] == 0
 
 

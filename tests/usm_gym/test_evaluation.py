@@ -37,8 +37,8 @@ def short(mode: Any, preset: str, seed: int, duration: float = 6.0) -> Scenario:
 def mixed() -> tuple[Scenario, ...]:
     """Return scenarios of several modes, lengths and timings, not in any order."""
     operation = [short("operation", "rough", k, 6.0 + k % 3) for k in range(4)]
-    fast = replace(PRESETS["field"], control_period=0.01)
-    fine = replace(PRESETS["field"], physics_step=5e-4)
+    fast = replace(PRESETS["field"], physics_step=2e-3)
+    fine = replace(PRESETS["field"], physics_step=5e-4, hydrodynamics="kelasidi2014")
     return (
         operation[0],
         replace(operation[1], conditions=fast),
@@ -108,6 +108,34 @@ def test_the_company_of_scenarios_does_not_matter() -> None:
         assert_same(usm_gym.evaluate(policy(), [mixed()[k]]), scored(), [k])
     twice = usm_gym.evaluate(policy(), [*mixed()[:2], *mixed()[:2]])
     assert_same(twice, scored(), [0, 1, 0, 1])
+
+
+def test_control_periods_may_differ_where_the_policy_knows_of_none() -> None:
+    slow, fast = (
+        replace(
+            short("operation", "field", 3),
+            conditions=replace(PRESETS["field"], control_period=period),
+            path=Path(speed=0.01, amplitude=0.0),
+        )
+        for period in (0.02, 0.01)
+    )
+    both = usm_gym.evaluate(Still(), [slow, fast, slow])
+    for k, scenario in ((0, slow), (1, fast), (2, slow)):
+        assert_same(usm_gym.evaluate(Still(), [scenario]), both, [k])
+    assert both.per_episode["rms_error_x"][0] != both.per_episode["rms_error_x"][1]
+    with pytest.raises(ValueError, match="control_period"):
+        usm_gym.evaluate(policy(), [slow, fast])
+
+
+def test_an_episode_that_leaves_nothing_to_score_is_refused_at_once() -> None:
+    class Unreachable(Still):
+        def predict(self, *_: Any, **__: Any) -> Any:
+            raise AssertionError("the episode was begun")
+
+    scenario = short("operation", "field", 0)
+    everything = replace(scenario.inspection, times=(0.4,))
+    with pytest.raises(ValueError, match="shifts"):
+        usm_gym.evaluate(Unreachable(), [scenario, replace(scenario, inspection=everything)])
 
 
 def test_the_scores_are_all_different_numbers() -> None:
@@ -185,7 +213,10 @@ def test_a_lost_episode_counts_as_half_a_metre_or_worse_in_both_axes() -> None:
 
 def test_a_loss_before_settling_is_a_loss() -> None:
     away = replace(
-        short("torpedo", "ideal", 0), path=Path(speed=0.3, amplitude=0.0), settle_time=5.0
+        short("torpedo", "ideal", 0),
+        path=Path(speed=0.3, amplitude=0.0),
+        inspection=Inspection(times=(), deflections=()),
+        settle_time=5.0,
     )
     result = usm_gym.evaluate(Still(), [away])
     assert result.failed.all()

@@ -83,7 +83,9 @@ def cache_folder(package: Path) -> str | None:
     for base in filter(None, bases):
         folder = base / fingerprint.hexdigest()[:16]
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if folder.stat().st_uid != _user():
+                continue  # what is loaded from there is run: never from somebody else's folder
             with tempfile.TemporaryFile(dir=folder):
                 return str(folder)
         except OSError:
@@ -96,5 +98,5 @@ def cache_folder(package: Path) -> str | None:
     return None
 
 
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else "user"
+def _user() -> int:
+    return os.getuid() if hasattr(os, "getuid") else 0

@@ -211,7 +211,8 @@ def observe(fleet, plant, table, robot, lanes):
         robot % lanes,
         plant.links,
         plant.h,
-        fleet.noise[robot, fleet.instant[robot]],
+        # A robot whose episode has ended may be stepped on until it is restarted.
+        fleet.noise[robot, min(fleet.instant[robot], fleet.noise.shape[1] - 1)],
         table,
         fleet.error[robot],
         fleet.observation[robot],
