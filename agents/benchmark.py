@@ -22,12 +22,14 @@ from usm_gym.evaluation import evaluate
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot, Thruster
 from usm_gym.scenario import Conditions, named, sample
+from usm_gym.scenario import Path as Track
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.simulation import Simulation
 from usm_gym.suites import suite
 
 ROBOTS = 256
 SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
+HERE = Track(speed=0.0, amplitude=0.0)
 FIRST_STEP = """
 import gymnasium, usm_gym
 env = gymnasium.make("USM-Operation-v0")
@@ -92,13 +94,16 @@ def interleaved(
 def plant_task(
     name: str, size: int, period: float, threads: int = 1, robot: Robot | None = None
 ) -> Task:
-    """Physics steps of `size` robots, per robot and step, with the joints moving."""
+    """Physics steps of `size` robots, per robot and step, with the joints moving.
+
+    Without thrust they have to keep near a reference that rests, or they would be lost.
+    """
     body = robot or Robot()
-    conditions = Conditions(control_period=period)
+    conditions = Conditions(control_period=period, current_limit=0.0)
     scenarios = [
         replace(
             sample("operation", conditions, stream(0, EVALUATION, i), body.links - 1),
-            duration=40.0,
+            path=HERE,
         )
         for i in range(min(size, 64))
     ]

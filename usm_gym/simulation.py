@@ -75,7 +75,7 @@ class Simulation:
         self.layout = ObservationLayout(robot.links, len(robot.thrusters))
         self._lanes = WIDTH if self.size > 1 else 1
         self._kernel = run_lanes if self._lanes > 1 else run_singles
-        self._table = Table(self.layout.starts, self.layout.scale, self.layout.bound)
+        self._table = Table(self.layout.starts, 1.0 / self.layout.scale, self.layout.bound)
         self._timing = scenarios[0].conditions.timing
         blocks = -(-self.size // self._lanes)
         numbers = rows.rows(robot.links, len(robot.thrusters))

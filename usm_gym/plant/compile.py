@@ -32,7 +32,7 @@ def compiled(function: F) -> F:
     code after an edit of a helper.
     """
     source = Path(function.__code__.co_filename).resolve()
-    folder = cache_folder(source.parent)
+    folder = cache_folder(source.parent) if source.exists() else None
     options: dict[str, Any] = {
         "fastmath": FLAGS,
         "error_model": "numpy",

@@ -49,12 +49,12 @@ class Table(NamedTuple):
 
     Attributes:
         starts: First index of each entry, and the size of the whole, int64.
-        scale: Physical value over observed value of each number.
+        gain: Observed value over physical value of each number.
         bound: Bound of each observed number, float32.
     """
 
     starts: NDArray[np.int64]
-    scale: NDArray[np.float64]
+    gain: NDArray[np.float64]
     bound: NDArray[np.float32]
 
 
@@ -94,7 +94,7 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
     Returns:
         The heading error as it is known on board, rad.
     """
-    starts, scale, bound = table
+    starts, gain, bound = table
     t = row[CLOCK * lanes + lane] * h
     p_x, p_y, v_x, v_y, a_x, a_y = path(
         t,
@@ -106,20 +106,20 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
     error[0] = row[P_X * lanes + lane] - p_x
     error[1] = row[P_Y * lanes + lane] - p_y
     k = starts[POSITION_ERROR]
-    observation[k] = (error[0] + noise[0]) / scale[k]
-    observation[k + 1] = (error[1] + noise[1]) / scale[k + 1]
+    observation[k] = (error[0] + noise[0]) * gain[k]
+    observation[k + 1] = (error[1] + noise[1]) * gain[k + 1]
     k = starts[REFERENCE_VELOCITY]
-    observation[k] = v_x / scale[k]
-    observation[k + 1] = v_y / scale[k + 1]
+    observation[k] = v_x * gain[k]
+    observation[k + 1] = v_y * gain[k + 1]
     k = starts[REFERENCE_ACCELERATION]
-    observation[k] = a_x / scale[k]
-    observation[k + 1] = a_y / scale[k + 1]
+    observation[k] = a_x * gain[k]
+    observation[k + 1] = a_y * gain[k + 1]
 
     angles, rates, shares = row_of(THETA, links), row_of(OMEGA, links), row_of(SHARE, links)
     theta = row[angles * lanes + lane]
     omega = row[rates * lanes + lane]
-    observation[starts[TAIL_ANGLE]] = theta / scale[starts[TAIL_ANGLE]]
-    observation[starts[TAIL_RATE]] = omega / scale[starts[TAIL_RATE]]
+    observation[starts[TAIL_ANGLE]] = theta * gain[starts[TAIL_ANGLE]]
+    observation[starts[TAIL_RATE]] = omega * gain[starts[TAIL_RATE]]
     reference = row[DEFLECTION * lanes + lane]
     reference_rate = row[DEFLECTION_RATE * lanes + lane]
     reference_acceleration = row[DEFLECTION_ACCELERATION * lanes + lane]
@@ -129,15 +129,15 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
         omega_next = row[(rates + i + 1) * lanes + lane]
         share = row[(shares + i) * lanes + lane]
         k = starts[JOINT_ANGLES] + i
-        observation[k] = (theta - theta_next) / scale[k]
+        observation[k] = (theta - theta_next) * gain[k]
         k = starts[JOINT_RATES] + i
-        observation[k] = (omega - omega_next) / scale[k]
+        observation[k] = (omega - omega_next) * gain[k]
         k = starts[JOINT_REFERENCES] + i
-        observation[k] = share * reference / scale[k]
+        observation[k] = share * reference * gain[k]
         k = starts[JOINT_REFERENCE_RATES] + i
-        observation[k] = share * reference_rate / scale[k]
+        observation[k] = share * reference_rate * gain[k]
         k = starts[JOINT_REFERENCE_ACCELERATIONS] + i
-        observation[k] = share * reference_acceleration / scale[k]
+        observation[k] = share * reference_acceleration * gain[k]
         theta, omega = theta_next, omega_next
         heading += theta
     heading = theta if row[HEAD_HEADING * lanes + lane] > 0.0 else heading / links
@@ -146,15 +146,15 @@ def measure(row, lanes, lane, links, h, noise, table, error, observation):
         distance -= p_y
     heading_error = heading - line_of_sight(distance, row[LOOK_AHEAD * lanes + lane])
     k = starts[HEADING_ERROR]
-    observation[k] = heading_error / scale[k]
+    observation[k] = heading_error * gain[k]
 
     limit = row[LIMIT * lanes + lane]
     commands = first_command(links)
     k = starts[THRUSTER_COMMAND]
     for j in range(starts[THRUSTER_LIMIT] - k):
-        observation[k + j] = row[(commands + j) * lanes + lane] / limit / scale[k + j]
+        observation[k + j] = row[(commands + j) * lanes + lane] / limit * gain[k + j]
     k = starts[THRUSTER_LIMIT]
-    observation[k] = limit / scale[k]
+    observation[k] = limit * gain[k]
     for k in range(observation.size):
         observation[k] = min(max(observation[k], -bound[k]), bound[k])
     return heading_error
