@@ -14,7 +14,7 @@ from usm_gym.robot import Robot
 AXES = ("x", "y")
 Records = dict[tuple[str, Any], Record]
 
-# Figure: (caption, row, mode, how it is drawn).
+# Figure: (caption, row, mode).
 CAPTIONS = {
     "fig03": ("Torpedo mode", "sta", "torpedo"),
     "fig04": ("Operation mode", "sta", "operation"),
@@ -69,10 +69,12 @@ def link_ends(record: Record, sample: int, robot: Robot) -> Array:
 def _bodies(record: Record, row: str) -> Any:
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(8, 4.5), layout="constrained")
+    figure, axes = plt.subplots(figsize=(9, 3.2), layout="constrained")
     position = record.reference + record.error
-    axes.plot(*record.reference.T, color="0.6", linewidth=1, label="reference of the CM")
-    axes.plot(*position.T, color="C0", linewidth=1, label="CM")
+    axes.plot(
+        *record.reference.T, "--", color="k", linewidth=1, label="reference of the CM", zorder=4
+    )
+    axes.plot(*position.T, color="C3", linewidth=1.5, label="CM", zorder=3)
     times = (0.0, 9.0, 15.0, 25.0, 39.0)
     for number, time in enumerate(times):
         sample = int(np.searchsorted(record.time, time))
@@ -81,7 +83,7 @@ def _bodies(record: Record, row: str) -> Any:
         axes.plot(*ends.T, color=colour, linewidth=3, solid_capstyle="round", label=f"{time:g} s")
         axes.plot(*ends[-1], "o", color=colour, markersize=6)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axes.legend(fontsize=8, ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.18))
+    figure.legend(fontsize=8, ncols=7, loc="outside lower center")
     return figure
 
 
@@ -114,7 +116,7 @@ def _signals(record: Record, row: str) -> Any:
     panels[3].set(ylabel="observer error $e_1$ [m]", xlabel="time [s]")
     for panel in panels:
         panel.grid(alpha=0.3)
-        panel.legend(fontsize=8, ncols=4, loc="upper right")
+        panel.legend(fontsize=8, ncols=4, loc="upper left")
     return figure
 
 
