@@ -91,8 +91,10 @@ class Simulation:
         self.lost = np.zeros(self.size, bool)
         self._settled = np.zeros(self.size, np.int64)
         self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, 2))
-        self._threads = min(threads, blocks)
-        self._pool = ThreadPoolExecutor(self._threads - 1) if self._threads > 1 else None
+        # Each thread has its share of the blocks; this one's is the first.
+        shares = min(threads, blocks)
+        self._shares = list(pairwise(np.linspace(0, blocks, shares + 1, dtype=np.int64).tolist()))
+        self._pool = ThreadPoolExecutor(shares - 1) if shares > 1 else None
         self._shifts, self._moving_water = 0, False
         self._share_out()
         for index, scenario in enumerate(scenarios):
@@ -168,14 +170,13 @@ class Simulation:
             action: Thruster commands over the thruster limits, (size, thrusters); values beyond
                 [-1, 1] saturate.
         """
-        edges = np.linspace(0, len(self._rows), self._threads + 1, dtype=np.int64).tolist()
         arguments = (self.fleet, self.plant, self._table, action)
         others = [
             self._pool.submit(self._kernel, *arguments, first, last)
-            for first, last in pairwise(edges[:-1])
+            for first, last in self._shares[1:]
             if self._pool is not None
         ]
-        self._kernel(*arguments, *edges[-2:])
+        self._kernel(*arguments, *self._shares[0])
         for other in others:
             other.result()
         # Compiled code assumes finite numbers, so that what is none is found here.

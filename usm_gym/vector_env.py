@@ -222,7 +222,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
     def _infos(self, which: Flags) -> dict[str, Any]:
         vector: dict[str, Any] = {}
         for key, values in infos(self.simulation).items():
-            vector[key] = np.where(which, values, np.zeros_like(values))
+            vector[key] = values * which
             vector[f"_{key}"] = which
         return vector
 
