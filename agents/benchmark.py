@@ -21,7 +21,7 @@ from baselines.registry import make
 from usm_gym.evaluation import evaluate
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot, Thruster
-from usm_gym.scenario import Conditions, named, sample
+from usm_gym.scenario import Conditions, Scenario, named, sample
 from usm_gym.scenario import Path as Track
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.simulation import Simulation
@@ -100,15 +100,7 @@ def plant_task(
     """
     body = robot or Robot()
     conditions = Conditions(control_period=period, current_limit=0.0)
-    scenarios = [
-        replace(
-            sample("operation", conditions, stream(0, EVALUATION, i), body.links - 1),
-            path=HERE,
-        )
-        for i in range(min(size, 64))
-    ]
-    batch = [scenarios[i % len(scenarios)] for i in range(size)]
-    simulation = Simulation(body, batch, threads)
+    simulation = Simulation(body, resting(size, conditions, body), threads)
     start = simulation.snapshot()
     action = np.zeros((size, len(body.thrusters)), np.float32)
 
@@ -120,12 +112,35 @@ def plant_task(
     return Task(name, run, size * conditions.substeps)
 
 
+def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
+    """Sampled scenarios whose reference rests, so that robots are not lost without a controller."""
+    scenarios = [
+        replace(
+            sample("operation", conditions, stream(0, EVALUATION, i), robot.links - 1),
+            path=HERE,
+        )
+        for i in range(min(size, 64))
+    ]
+    return [scenarios[i % len(scenarios)] for i in range(size)]
+
+
 def vector_task(name: str, size: int, steps: int, threads: int = 1) -> Task:
-    """Whole steps of the vector environment, per robot: observation, reward, autoreset."""
+    """Whole steps of the vector environment, per robot, within episodes.
+
+    Starts of episodes are timed by `start_task`: how many there are depends on the policy.
+    """
     envs = gym.make_vec(
         "USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point", threads=threads
     )
-    return _loop(name, envs, steps, size)
+    options = {"scenario": resting(size, Conditions(current_limit=0.0), Robot())}
+    return _loop(name, envs, steps, size, options)
+
+
+def start_task(name: str, size: int) -> Task:
+    """Starts of episodes in the vector environment: draw, noise, first observation; us."""
+    envs = gym.make_vec("USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point")
+    envs.reset(seed=0)
+    return Task(name, envs.reset, size, 1e6)
 
 
 def sync_task(name: str, size: int, steps: int) -> Task:
@@ -179,8 +194,10 @@ def mujoco_chain(robot: Robot) -> str:
     return f"<mujoco>{option}{world}</mujoco>"
 
 
-def _loop(name: str, env: Any, steps: int, size: int) -> Task:
-    env.reset(seed=0)
+def _loop(
+    name: str, env: Any, steps: int, size: int, options: dict[str, Any] | None = None
+) -> Task:
+    env.reset(seed=0, options=options)
     env.action_space.seed(0)
     single = isinstance(env, gym.Env)
     # Random actions of mean zero, as at the start of a training.

@@ -39,6 +39,7 @@ MEANINGS = {
     "mujoco_step_ns": "MuJoCo, C loop, Euler, the same chain, ns",
     "vector_env_step_ns": f"environment step, {ROBOTS} robots, one thread, per robot, ns",
     "vector_env_two_threads_step_ns": "the same on two threads, ns",
+    "episode_start_us": "start of an episode in the vector environment, us",
     "sync_vector_env_step_ns": "SyncVectorEnv of 8 of our environments, per robot, ns",
     "swimmer_v5_step_ns": "Gymnasium's Swimmer-v5, ns",
     "cartpole_vector_env_step_ns": f"Gymnasium's CartPole vector environment, {ROBOTS}, ns",
@@ -116,6 +117,7 @@ def available() -> tuple[list[Task], list[str]]:
         "vector_env_step_ns": lambda name: benchmark.vector_task(name, ROBOTS, 20),
         "vector_env_two_threads_step_ns": lambda name: benchmark.vector_task(name, ROBOTS, 20, 2),
         "sync_vector_env_step_ns": lambda name: benchmark.sync_task(name, 8, 50),
+        "episode_start_us": lambda name: benchmark.start_task(name, 64),
         "swimmer_v5_step_ns": lambda name: benchmark.swimmer_task(name, 500),
         "cartpole_vector_env_step_ns": lambda name: benchmark.cartpole_task(name, ROBOTS, 200),
     }
