@@ -321,3 +321,17 @@ def test_a_summary_is_that_of_its_episodes() -> None:
         assert summary["per_episode"][name] == values.tolist()
     assert summary["failures"] == 0
     assert json.dumps(summary) == json.dumps(scored().summary())  # the bootstrap has a seed
+
+
+def test_a_privileged_policy_is_given_the_true_state() -> None:
+    class Seer(Still):
+        privileged = True
+
+        def predict(self, observation: Any, state: Any = None, *rest: Any, **known: Any) -> Any:
+            seen.append(known.pop("snapshot").arrays["error"].copy())
+            return super().predict(observation, state, *rest, **known)
+
+    seen: list[Array] = []
+    scenario = short("operation", "field", 0, 1.0)
+    (trajectory,) = rollout(Seer(), [scenario], ROBOT)
+    assert np.array_equal(np.concatenate(seen[1:]), trajectory.error[:-1])
