@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 from baselines.pd import PD
 from baselines.policy import Policy
+from baselines.space import Space
 from baselines.super_twisting import SuperTwisting
 from baselines.zero import Zero
 from usm_gym.nominal import Nominal
@@ -22,12 +23,14 @@ class Entry:
     Attributes:
         factory: Makes the policy from nominal knowledge; keyword arguments are its gains.
         summary: What it is, in a line.
+        space: The gains that are tuned, by name, and where.
         slow: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
     """
 
     factory: Callable[..., Policy]
     summary: str
+    space: Space = field(default_factory=dict)
     slow: bool = False
     privileged: bool = False
 
@@ -40,6 +43,7 @@ def register(
     factory: Callable[..., Policy],
     summary: str,
     *,
+    space: Space | None = None,
     slow: bool = False,
     privileged: bool = False,
 ) -> None:
@@ -50,6 +54,7 @@ def register(
         factory: `factory(nominal, **gains)` returns an object with `predict`; it is given
             `env.unwrapped.nominal` and no more of the environment.
         summary: What it is, in a line.
+        space: The gains that are tuned, by name, and where; without it, none are.
         slow: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state.
 
@@ -57,7 +62,7 @@ def register(
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
-    _entries[id] = Entry(factory, summary, slow, privileged)
+    _entries[id] = Entry(factory, summary, space or {}, slow, privileged)
 
 
 def ids() -> list[str]:
