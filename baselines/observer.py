@@ -40,7 +40,8 @@ def implicit_observer(y, u, h, k, state):
         u: Input over the past step, m/s^2.
         h: Step, s.
         k: Gains (k1, k2, k3).
-        state: (p1, p2, p3, e1) at the old time, in an array; becomes that at the new time.
+        state: (p1, p2, p3, e) at the old time, in an array; becomes that at the new time. e is the
+            cube root of e1 = y - p1, of the same sign, as the next step needs it.
 
     Returns:
         The corrections (z1, z2) at the new time, m/s and m/s^2.
@@ -67,8 +68,8 @@ def implicit_observer(y, u, h, k, state):
     z2 = k2 * r * xi
     state[2] += h * k3 * xi
     state[1] += h * (state[2] + z2 + u)
-    state[3] = r * r * r * xi
-    state[0] = y - state[3]
+    state[3] = r * xi
+    state[0] = y - r * r * r * xi
     return z1, z2
 
 
@@ -76,15 +77,14 @@ def implicit_observer(y, u, h, k, state):
 def explicit_observer(y, u, h, k, state):
     """One step of Euler's forward method on (15)-(16), as in the paper; see the implicit one."""
     k1, k2, k3 = k
-    r = cube_root(abs(state[3]))
-    sign = np.sign(state[3])
-    state[0] += h * (state[1] + k1 * r * r * sign)
-    state[1] += h * (state[2] + k2 * r * sign + u)
-    state[2] += h * k3 * sign
-    state[3] = y - state[0]
-    r = cube_root(abs(state[3]))
-    sign = np.sign(state[3])
-    return k1 * r * r * sign, k2 * r * sign
+    e = state[3]
+    state[0] += h * (state[1] + k1 * e * abs(e))
+    state[1] += h * (state[2] + k2 * e + u)
+    state[2] += h * k3 * np.sign(e)
+    error = y - state[0]
+    e = cube_root(abs(error)) * np.sign(error)
+    state[3] = e
+    return k1 * e * abs(e), k2 * e
 
 
 @piece
@@ -99,7 +99,7 @@ def observe(implicit, started, y, u, velocity, h, k, state):
         velocity: Velocity of the reference now, m/s.
         h: Step, s.
         k: Gains (k1, k2, k3).
-        state: (p1, p2, p3, e1), advanced in place.
+        state: (p1, p2, p3, e), see `implicit_observer`, advanced in place.
 
     Returns:
         The corrections (z1, z2), m/s and m/s^2.

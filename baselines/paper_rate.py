@@ -11,7 +11,7 @@ from baselines.observer import observe, observer_gains
 from baselines.pd import PDGains, pd_force
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
 from usm_gym.plant.chain import kinematics
-from usm_gym.plant.compile import compiled
+from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.lanes import WIDTH, block_at, spread
 from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
@@ -115,6 +115,21 @@ def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None
     return record
 
 
+@piece
+def law_force(law, k, started, error, rate, acceleration, start, force, h, mass, state):
+    """One step of observer and law in one axis: the force on the centre of mass, N.
+
+    Arguments in the axis: position error (m), rate (m/s) and acceleration (m/s^2) of the reference,
+    p2(0) (m/s), the force of the last step (N).
+    """
+    u = force / mass - acceleration
+    z1, z2 = observe(law.implicit, started, error, u, rate - start, h, k, state)
+    if law.reading == SUPER_TWISTING:
+        gains = law.super_twisting
+        return super_twisting_force(z1, z2, acceleration, h, mass, gains, law.implicit, state)
+    return pd_force(z1, z2, acceleration, mass, law.pd, law.reading, state)
+
+
 @compiled
 def closed_loop(blocks, plant, mass, law, every, record):
     """Plant, observer, control law and allocation, step by step; fills in the record."""
@@ -133,52 +148,39 @@ def closed_loop(blocks, plant, mass, law, every, record):
     k_pd = observer_gains(law.pd.observer_gain, law.pd.k2_exponent)
     k = k_sta if sta else k_pd
     heading_gain = gains.heading_gain if sta else law.pd.heading_gain
-    state = np.zeros((2, 6))
-    state[:, 5] = gains.alpha_start
-    force = np.zeros(2)
-    error = np.zeros(2)
+    surface = gains.surface if sta else law.pd.surface
+    state_x, state_y = np.zeros(6), np.zeros(6)
+    state_x[5] = state_y[5] = gains.alpha_start
+    start_x, start_y = law.start
+    f_x, f_y = 0.0, 0.0
     for step in range(record.time.size * every):
         t = step * h
         p_x, p_y, v_x, v_y, a_x, a_y = path(t, row[SPEED], row[SWAY], row[FREQUENCY], row[RAMP])
-        error[0], error[1] = row[P_X] - p_x, row[P_Y] - p_y
-        for axis in range(2):
-            velocity, acceleration = (v_x, a_x) if axis == 0 else (v_y, a_y)
-            z1, z2 = observe(
-                law.implicit,
-                float(step),
-                error[axis],
-                force[axis] / mass - acceleration,
-                velocity - law.start[axis],
-                h,
-                k,
-                state[axis],
-            )
-            if sta:
-                force[axis] = super_twisting_force(
-                    z1, z2, acceleration, h, mass, gains, law.implicit, state[axis]
-                )
-            else:
-                force[axis] = pd_force(z1, z2, acceleration, mass, law.pd, law.reading, state[axis])
+        e_x, e_y = row[P_X] - p_x, row[P_Y] - p_y
+        started = float(step)
+        f_x = law_force(law, k, started, e_x, v_x, a_x, start_x, f_x, h, mass, state_x)
+        f_y = law_force(law, k, started, e_y, v_y, a_y, start_y, f_y, h, mass, state_y)
         if plant.moving_water:
             move_water(block, 0.0, h)
-        base = kinematics(block, 0.0, wide, WIDTH, links, plant.body.l)
-        heading = theta.mean() if row[HEAD_HEADING] == 0.0 else theta[links - 1]
+        base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
+        heading = 0.0
+        for i in range(links):
+            heading += theta[i]
+        heading = heading / links if row[HEAD_HEADING] == 0.0 else theta[links - 1]
         distance = row[P_Y] - (p_y if row[CROSS_TRACK] > 0.0 else 0.0)
         moment = -heading_gain * (heading - line_of_sight(distance, row[LOOK_AHEAD]))
-        allocation_matrix(
-            sine, cosine, plant.body.l, plant.thruster_links, plant.thruster_is_normal, T
-        )
-        allocate(T, force[0], force[1], moment, commands)
+        allocation_matrix(sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T)
+        allocate(T, f_x, f_y, moment, commands)
         if step % every == 0:
             n = step // every
             record.time[n] = t
             record.reference[n, 0], record.reference[n, 1] = p_x, p_y
-            record.error[n] = error
-            record.force[n] = force
+            record.error[n, 0], record.error[n, 1] = e_x, e_y
+            record.force[n, 0], record.force[n, 1] = f_x, f_y
             record.effort[n] = np.abs(commands).mean()
             record.theta[n] = theta
-            for axis in range(2):
-                surface = gains.surface if sta else law.pd.surface
-                record.sigma[n, axis] = surface * state[axis, 0] + state[axis, 1]
-                record.observer_error[n, axis] = state[axis, 3]
+            record.sigma[n, 0] = surface * state_x[0] + state_x[1]
+            record.sigma[n, 1] = surface * state_y[0] + state_y[1]
+            record.observer_error[n, 0] = e_x - state_x[0]
+            record.observer_error[n, 1] = e_y - state_y[0]
         physics_step(block, 0.0, wide, WIDTH, plant, base)

@@ -48,7 +48,7 @@ def pd_force(z1, z2, acceleration, mass, gains, reading, state):
         mass: Total mass m_t, kg.
         gains: Gains.
         reading: FORCE, MASS or OBSERVER.
-        state: (p1, p2, p3, e1) of the observer.
+        state: The observer's four numbers.
     """
     u_pd = -gains.k_d * state[1] - gains.k_p * state[0]
     if reading == FORCE:

@@ -50,36 +50,37 @@ def adapt(sigma, alpha, h, gains):
 
 
 @piece
-def implicit_super_twisting(sigma, h, gains, state):
+def implicit_super_twisting(sigma, h, gains, v, alpha):
     """u_STA of (11) by an implicit step, exact in its sliding set.
 
     Args:
         sigma: Sliding variable, m/s.
         h: Step, s.
         gains: Gains.
-        state: (v, alpha) in an array; becomes that of the next step.
+        v: Integral term, m/s^2.
+        alpha: Adapted gain.
+
+    Returns:
+        u_STA, and v and alpha of the next step.
     """
-    alpha = state[1]
-    beta, state[1] = adapt(sigma, alpha, h, gains)
-    b = sigma + h * state[0]
+    beta, alpha_next = adapt(sigma, alpha, h, gains)
+    b = sigma + h * v
     sliding = h * h * beta
     xi, root = b / sliding, 0.0
     if abs(b) > sliding:
         xi = 1.0 if b > 0.0 else -1.0
         half = 0.5 * h * alpha
         root = np.sqrt(half * half + abs(b) - sliding) - half
-    state[0] -= h * beta * xi
-    return state[0] - alpha * root * xi
+    v -= h * beta * xi
+    return v - alpha * root * xi, v, alpha_next
 
 
 @piece
-def explicit_super_twisting(sigma, h, gains, state):
+def explicit_super_twisting(sigma, h, gains, v, alpha):
     """u_STA of (11) by Euler's forward method; see the implicit one."""
-    v, alpha = state[0], state[1]
-    beta, state[1] = adapt(sigma, alpha, h, gains)
+    beta, alpha_next = adapt(sigma, alpha, h, gains)
     sign = np.sign(sigma)
-    state[0] -= h * beta * sign
-    return v - alpha * np.sqrt(abs(sigma)) * sign
+    return v - alpha * np.sqrt(abs(sigma)) * sign, v - h * beta * sign, alpha_next
 
 
 @piece
@@ -94,13 +95,13 @@ def super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, state):
         mass: Total mass m_t, kg.
         gains: Gains.
         implicit: Whether to discretise implicitly.
-        state: (p1, p2, p3, e1, v, alpha); v and alpha are advanced in place.
+        state: The observer's four numbers, v and alpha; these two are advanced in place.
     """
     sigma = gains.surface * state[0] + state[1]
     if implicit:
-        u_sta = implicit_super_twisting(sigma, h, gains, state[4:])
+        u_sta, state[4], state[5] = implicit_super_twisting(sigma, h, gains, state[4], state[5])
     else:
-        u_sta = explicit_super_twisting(sigma, h, gains, state[4:])
+        u_sta, state[4], state[5] = explicit_super_twisting(sigma, h, gains, state[4], state[5])
     return mass * (-gains.surface * (state[1] + z1) - state[2] - z2 + acceleration + u_sta)
 
 

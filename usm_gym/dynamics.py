@@ -69,7 +69,7 @@ def accelerations(
         l=robot.half_length,
         m=robot.link_mass,
         J=robot.link_inertia,
-        h=0.0,
+        implicit=0.0,
         kirchhoff=float(hydrodynamics == "consistent"),
     )
     accelerate_one(block[np.newaxis], n, body)

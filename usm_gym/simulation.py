@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.metrics import LOST_ERROR, TIME_TOLERANCE
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant import layout as rows
-from usm_gym.plant.chain import Body
 from usm_gym.plant.lanes import WIDTH
 from usm_gym.plant.measure import Table
 from usm_gym.plant.motion import filter_coefficients, lag_share
-from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles
+from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles, run_threads
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.validation import require
@@ -67,14 +65,14 @@ class Simulation:
         Args:
             robot: The robot.
             scenarios: One scenario for each copy of it.
-            threads: How many threads share a step; without effect on its result.
+            threads: How many threads share a step, at most one per core; without effect on its
+                result.
         """
         require(threads >= 1, "threads", threads, "1 or more")
         self.robot = robot
         self.size = len(scenarios)
         self.layout = ObservationLayout(robot.links, len(robot.thrusters))
         self._lanes = WIDTH if self.size > 1 else 1
-        self._kernel = run_lanes if self._lanes > 1 else run_singles
         self._table = Table(self.layout.starts, 1.0 / self.layout.scale, self.layout.bound)
         self._timing = scenarios[0].conditions.timing
         blocks = -(-self.size // self._lanes)
@@ -91,10 +89,7 @@ class Simulation:
         self.lost = np.zeros(self.size, bool)
         self._settled = np.zeros(self.size, np.int64)
         self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, 2))
-        # Each thread has its share of the blocks; this one's is the first.
-        shares = min(threads, blocks)
-        self._shares = list(pairwise(np.linspace(0, blocks, shares + 1, dtype=np.int64).tolist()))
-        self._pool = ThreadPoolExecutor(shares - 1) if shares > 1 else None
+        self._threads = min(threads, blocks, numba.config.NUMBA_NUM_THREADS)
         self._shifts, self._moving_water = 0, False
         self._share_out()
         for index, scenario in enumerate(scenarios):
@@ -171,24 +166,22 @@ class Simulation:
                 [-1, 1] saturate.
         """
         arguments = (self.fleet, self.plant, self._table, action)
-        others = [
-            self._pool.submit(self._kernel, *arguments, first, last)
-            for first, last in self._shares[1:]
-            if self._pool is not None
-        ]
-        self._kernel(*arguments, *self._shares[0])
-        for other in others:
-            other.result()
+        if self._threads > 1:
+            # The number belongs to the calling thread, not to this simulation.
+            previous = numba.get_num_threads()
+            numba.set_num_threads(self._threads)
+            try:
+                run_threads(*arguments)
+            finally:
+                numba.set_num_threads(previous)
+        else:
+            kernel = run_lanes if self._lanes > 1 else run_singles
+            kernel(*arguments, 0, len(self._rows))
         # Compiled code assumes finite numbers, so that what is none is found here.
         distance = np.abs(self.error).max(axis=1) + 0.0 * self.heading_error
         np.logical_not(distance <= LOST_ERROR, out=self.lost)
         if self.lost.any():
             self._tidy(self.lost)
-
-    def close(self) -> None:
-        """Give back the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
 
     def snapshot(self) -> Snapshot:
         """Copy the whole state."""
@@ -219,13 +212,11 @@ class Simulation:
         conditions = self.scenarios[0].conditions
         implicit = conditions.physics_step if conditions.integrator == "symplectic" else 0.0
         self.plant = Plant(
-            body=Body(
-                l=self.robot.half_length,
-                m=self.robot.link_mass,
-                J=self.robot.link_inertia,
-                h=implicit,
-                kirchhoff=float(conditions.hydrodynamics == "consistent"),
-            ),
+            l=self.robot.half_length,
+            m=self.robot.link_mass,
+            J=self.robot.link_inertia,
+            implicit=implicit,
+            kirchhoff=float(conditions.hydrodynamics == "consistent"),
             links=self.robot.links,
             thruster_links=self.robot.thruster_links,
             thruster_is_normal=self.robot.thruster_is_normal,

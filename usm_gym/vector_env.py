@@ -56,7 +56,8 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             robot: As of `USMEnv`.
             render_mode: As of `USMEnv`.
             autoreset_mode: What happens to a robot whose episode has ended.
-            threads: How many threads share a step; without effect on its result.
+            threads: How many threads share a step, at most one per core; without effect on its
+                result.
 
         Raises:
             ValueError: If an argument is not allowed.
@@ -113,9 +114,8 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         indices = np.flatnonzero(which).tolist()
         scenarios = {i: self._draw(i, self._options_of(i, options)) for i in indices}
         if which.all():
-            fresh = Simulation(self.robot, [scenarios[i] for i in indices], self.threads)
-            self.close_extras()
-            self._simulation = fresh
+            ordered = [scenarios[i] for i in indices]
+            self._simulation = Simulation(self.robot, ordered, self.threads)
         else:
             for index, scenario in scenarios.items():
                 self.simulation.start(index, scenario)
@@ -162,11 +162,6 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             truncated,
             self._infos(everyone),
         )
-
-    def close_extras(self, **kwargs: Any) -> None:
-        """Give back the threads."""
-        if self._simulation is not None:
-            self._simulation.close()
 
     def _restart(self, which: Flags) -> None:
         for index in np.flatnonzero(which).tolist():

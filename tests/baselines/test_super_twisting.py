@@ -22,12 +22,18 @@ MASS = 10.0  # kg, of a double integrator
 
 @numba.njit
 def implicit_law(sigma, h, gains, state):  # type: ignore[no-untyped-def]
-    return super_twisting.implicit_super_twisting(sigma, h, gains, state)
+    u, state[0], state[1] = super_twisting.implicit_super_twisting(
+        sigma, h, gains, state[0], state[1]
+    )
+    return u
 
 
 @numba.njit
 def explicit_law(sigma, h, gains, state):  # type: ignore[no-untyped-def]
-    return super_twisting.explicit_super_twisting(sigma, h, gains, state)
+    u, state[0], state[1] = super_twisting.explicit_super_twisting(
+        sigma, h, gains, state[0], state[1]
+    )
+    return u
 
 
 @numba.njit
@@ -43,9 +49,9 @@ def alone(sigma, h, gains, implicit, state, trace):  # type: ignore[no-untyped-d
     for i in range(trace.shape[0]):
         trace[i, 0], trace[i, 1] = sigma, state[1]
         if implicit:
-            sigma += h * super_twisting.implicit_super_twisting(sigma, h, gains, state)
+            sigma += h * implicit_law(sigma, h, gains, state)
         else:
-            sigma += h * super_twisting.explicit_super_twisting(sigma, h, gains, state)
+            sigma += h * explicit_law(sigma, h, gains, state)
 
 
 @numba.njit

@@ -27,14 +27,15 @@ class Body(NamedTuple):
         l: Half the length of a link, m.
         m: Mass of a link, kg.
         J: Moment of inertia of a link about its centre, kg m^2.
-        h: Step over which drag and joint controllers are taken implicitly, s; 0 for not at all.
+        implicit: Step over which drag and joint controllers are taken implicitly, s; 0 for not
+            at all.
         kirchhoff: 1.0 for the consistent added mass, 0.0 for that of Kelasidi et al. (2014).
     """
 
     l: float
     m: float
     J: float
-    h: float
+    implicit: float
     kirchhoff: float
 
 
@@ -89,11 +90,11 @@ def fluid_force(v_t, v_n, omega, water_t, coefficients, kirchhoff):
 
 @piece
 def inertia(v_t, v_n, omega, coefficients, body):
-    """Inertia of a link along, across and in yaw; implicit drag adds h times its slope."""
+    """Inertia of a link along, across and in yaw; implicit drag adds its step times its slope."""
     c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
-    along = body.m + body.h * (c_t * (1.0 + 2.0 * abs(v_t)))
-    across = body.m + mu + body.h * (c_n * (1.0 + 2.0 * abs(v_n)))
-    yaw = body.J + lambda_1 + body.h * (lambda_2 + 2.0 * lambda_3 * abs(omega))
+    along = body.m + body.implicit * (c_t * (1.0 + 2.0 * abs(v_t)))
+    across = body.m + mu + body.implicit * (c_n * (1.0 + 2.0 * abs(v_n)))
+    yaw = body.J + lambda_1 + body.implicit * (lambda_2 + 2.0 * lambda_3 * abs(omega))
     return along, across, yaw
 
 

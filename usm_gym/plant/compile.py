@@ -31,9 +31,30 @@ def compiled(function: F) -> F:
     numba's own cache looks at the file of the outermost function alone and would serve stale
     code after an edit of a helper.
     """
+    return _kernel(function)
+
+
+def parallel(function: F) -> F:
+    """Compile a kernel as `compiled` does; its loops over `numba.prange` are shared by threads."""
+    return _kernel(function, parallel=True)
+
+
+def piece(function: F) -> F:
+    """Compile a part of kernels, for use within `compiled` functions only."""
+    part: F = numba.njit(fastmath=FLAGS, error_model="numpy", forceinline=True)(function)
+    return part
+
+
+def shared(function: F) -> F:
+    """Let kernels call a plain Python function, which stays one for everybody else."""
+    kept: F = numba.extending.register_jitable(function)
+    return kept
+
+
+def _kernel(function: F, **options: Any) -> F:
     source = Path(function.__code__.co_filename).resolve()
     folder = cache_folder(source.parent) if source.exists() else None
-    options: dict[str, Any] = {
+    options |= {
         "fastmath": FLAGS,
         "error_model": "numpy",
         "nogil": True,
@@ -47,18 +68,6 @@ def compiled(function: F) -> F:
     finally:
         numba.config.CACHE_DIR = previous
     return kernel
-
-
-def piece(function: F) -> F:
-    """Compile a part of kernels, for use within `compiled` functions only."""
-    part: F = numba.njit(fastmath=FLAGS, error_model="numpy", forceinline=True)(function)
-    return part
-
-
-def shared(function: F) -> F:
-    """Let kernels call a plain Python function, which stays one for everybody else."""
-    kept: F = numba.extending.register_jitable(function)
-    return kept
 
 
 @lru_cache

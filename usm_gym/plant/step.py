@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.chain import Body, accelerate, kinematics
-from usm_gym.plant.compile import compiled, piece
+from usm_gym.plant.chain import accelerate, kinematics
+from usm_gym.plant.compile import compiled, parallel, piece
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
 from usm_gym.plant.layout import *
@@ -20,10 +21,10 @@ from usm_gym.plant.measure import command, measure
 
 
 class Plant(NamedTuple):
-    """What all robots of a fleet share.
+    """What all robots of a fleet share; with its first fields it serves as a `chain.Body`.
 
     Attributes:
-        body: Their links.
+        l, m, J, implicit, kirchhoff: As in `chain.Body`.
         links: Number of links.
         thruster_links: Zero-based link of each thruster, int64.
         thruster_is_normal: Whether each thruster pushes across its link.
@@ -33,7 +34,11 @@ class Plant(NamedTuple):
         moving_water: Whether the water's velocity changes in any episode.
     """
 
-    body: Body
+    l: float
+    m: float
+    J: float
+    implicit: float
+    kirchhoff: float
     links: int
     thruster_links: NDArray[np.int64]
     thruster_is_normal: NDArray[np.bool_]
@@ -161,12 +166,12 @@ def integrate(block, like, wide, stride, links, h, implicit):
 @piece
 def physics_step(block, like, wide, stride, plant, base):
     """One physics step from kinematics that are known; arguments as in `chain.accelerate`."""
-    links, h, implicit = plant.links, plant.h, plant.body.h
+    links, h, implicit = plant.links, plant.h, plant.implicit
     if implicit > 0.0:
         advance_references(block, like, plant.shifts, h)
     push(block, like, plant)
     joint_torques(block, like, wide, stride, links, implicit)
-    accelerate(block, like, wide, stride, links, base, plant.body)
+    accelerate(block, like, wide, stride, links, base, plant)
     if implicit == 0.0:
         advance_references(block, like, plant.shifts, h)
     integrate(block, like, wide, stride, links, h, implicit)
@@ -178,7 +183,7 @@ def advance(block, like, wide, stride, plant):
     for _ in range(plant.substeps):
         if plant.moving_water:
             move_water(block, like, plant.h)
-        base = kinematics(block, like, wide, stride, plant.links, plant.body.l)
+        base = kinematics(block, like, wide, stride, plant.links, plant.l)
         physics_step(block, like, wide, stride, plant, base)
 
 
@@ -235,3 +240,10 @@ def run_singles(fleet, plant, table, actions, first, last):
 def run_lanes(fleet, plant, table, actions, first, last):
     """`run` for blocks of `lanes.WIDTH` robots each."""
     run(fleet, plant, table, actions, spread(0.0), WIDTH, 1, first, last)
+
+
+@parallel
+def run_threads(fleet, plant, table, actions):
+    """`run_lanes` for all blocks, shared out among threads."""
+    for k in numba.prange(fleet.blocks.shape[0]):
+        run_lanes(fleet, plant, table, actions, k, k + 1)
