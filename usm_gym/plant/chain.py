@@ -175,78 +175,71 @@ def with_own(block, like, i, links, answer):
 
 
 @piece
-def shifted(l, s, c, omega, answer):
-    """Move a neighbour's answer by l along the tangent of a link.
-
-    q = q_new - l alpha n + l omega^2 t makes it an answer to the acceleration of the new point.
-    """
-    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
-    # l t and l omega^2 t first: they depend on no answer, on which all else here has to wait.
-    along_x, along_y = l * c, l * s
-    square = omega * omega
-    pull_x, pull_y = square * along_x, square * along_y
-    r_x = r_x - (c_xx * pull_x + c_xy * pull_y)
-    r_y = r_y - (c_xy * pull_x + c_yy * pull_y)
-    r = (r - (b_x * pull_x + b_y * pull_y)) - (r_y * along_x - r_x * along_y)
-    # b - l C n and a - 2 l b.n + l^2 n.C n, with l n = (-along_y, along_x).
-    moved_x = b_x - (c_xy * along_x - c_xx * along_y)
-    moved_y = b_y - (c_yy * along_x - c_xy * along_y)
-    a = a - ((b_y + moved_y) * along_x - (b_x + moved_x) * along_y)
-    return a, moved_x, moved_y, c_xx, c_xy, c_yy, r, r_x, r_y
-
-
-@piece
 def eliminate(block, like, i, side, links, l, answer):
-    """Eliminate link i: from the answer of the links beyond it, make the answer that includes it.
+    """Eliminate link i: make the answer, at its neighbour's point, of all links from it outwards.
 
-    `side` is 1.0 for a link between tail and root, -1.0 for one between root and head.
+    `side` is 1.0 for a link between tail and root, -1.0 for one between root and head; `answer` is
+    that of the links beyond it, at its own point.
+
+    With q = q' - alpha' n + p of its end, where n is the way from there to the neighbour's point
+    turned by 90 degrees and p the neighbour's centripetal acceleration, the link's moment is
+    (a + k) alpha + b . q' - g alpha' = z, which leaves an update of rank one.
     """
     rows = padded(links)
     sub = row_of(SUB_0, links) + i
+    inner = i + (1 if side > 0.0 else -1)
     joint = row_of(TORQUE, links) + (i if side > 0.0 else i - 1)
-    s, c, omega = axes(block, like, i, links)
-    answer = with_own(block, like, i, links, shifted(2.0 * side * l, s, c, omega, answer))
-    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = answer
-    # The joint's torque is u - k (alpha - alpha_next), k from its implicit treatment.
+    s, c, omega = axes(block, like, inner, links)
+    reach = side * (l if inner == links // 2 else 2.0 * l)
+    along_x, along_y = reach * c, reach * s
+    square = omega * omega
+    pull_x, pull_y = square * along_x, square * along_y
+    # The joint's torque is u - k (alpha - alpha'), k from its implicit treatment.
     k = load(block, JOINT_INERTIA, like)
     u = side * load(block, joint, like)
+    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = with_own(block, like, i, links, answer)
     inverse = 1.0 / (a + k)
-    sub_0 = (r + u) * inverse
-    sub_k = k * inverse
+    # What does not wait for the division, on which the next link has to wait.
+    turned_x = c_xy * along_x - c_xx * along_y
+    turned_y = c_yy * along_x - c_xy * along_y
+    g = k + (b_y * along_x - b_x * along_y)
+    z = (r + u) - (b_x * pull_x + b_y * pull_y)
+    r_x = r_x - (c_xx * pull_x + c_xy * pull_y)
+    r_y = r_y - (c_xy * pull_x + c_yy * pull_y)
+    sub_0 = z * inverse
+    sub_g = g * inverse
     sub_x = b_x * inverse
     sub_y = b_y * inverse
     store(block, sub, sub_0)
-    store(block, sub + rows, sub_k)
+    store(block, sub + rows, sub_g)
     store(block, sub + 2 * rows, sub_x)
     store(block, sub + 3 * rows, sub_y)
     return (
-        a * sub_k,
-        b_x * sub_k,
-        b_y * sub_k,
+        (k + (turned_y * along_x - turned_x * along_y)) - g * sub_g,
+        b_x * sub_g - turned_x,
+        b_y * sub_g - turned_y,
         c_xx - b_x * sub_x,
         c_xy - b_x * sub_y,
         c_yy - b_y * sub_y,
-        k * sub_0 - u,
+        (g * sub_0 - u) - (r_y * along_x - r_x * along_y),
         r_x - b_x * sub_0,
         r_y - b_y * sub_0,
     )
 
 
 @piece
-def solve_root(block, like, root, links, l, tail, head):
+def solve_root(block, like, root, links, tail, head):
     """Solve the root link: (alpha, q_x, q_y) of its centre."""
-    s, c, omega = axes(block, like, root, links)
-    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = shifted(l, s, c, omega, tail)
-    answer = with_own(block, like, root, links, shifted(-l, s, c, omega, head))
-    a += answer[0]
-    b_x += answer[1]
-    b_y += answer[2]
-    c_xx += answer[3]
-    c_xy += answer[4]
-    c_yy += answer[5]
-    r += answer[6]
-    r_x += answer[7]
-    r_y += answer[8]
+    a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y = with_own(block, like, root, links, tail)
+    a += head[0]
+    b_x += head[1]
+    b_y += head[2]
+    c_xx += head[3]
+    c_xy += head[4]
+    c_yy += head[5]
+    r += head[6]
+    r_x += head[7]
+    r_y += head[8]
     inverse = 1.0 / a
     c_xx -= b_x * b_x * inverse
     c_xy -= b_x * b_y * inverse
@@ -272,12 +265,12 @@ def half_link(block, like, i, links, alpha, l):
 def substitute(block, like, i, side, links, l, motion):
     """Find a link's motion from that of its neighbour towards the root.
 
-    `motion` is (alpha of the neighbour, acceleration q of the joint between the two, sum of the
-    accelerations of all link centres so far); returned is the same for the next link.
+    `motion` is (alpha of the neighbour, acceleration of its point, of the joint between the two,
+    sum of the accelerations of all link centres so far); returned is the same for the next link.
     """
     rows = padded(links)
     sub = row_of(SUB_0, links) + i
-    alpha, q_x, q_y, sum_x, sum_y = motion
+    alpha, q_x, q_y, joint_x, joint_y, sum_x, sum_y = motion
     alpha = (load(block, sub, like) + load(block, sub + rows, like) * alpha) - (
         load(block, sub + 2 * rows, like) * q_x + load(block, sub + 3 * rows, like) * q_y
     )
@@ -285,10 +278,12 @@ def substitute(block, like, i, side, links, l, motion):
     half_x, half_y = half_link(block, like, i, links, alpha, side * l)
     return (
         alpha,
-        q_x - 2.0 * half_x,
-        q_y - 2.0 * half_y,
-        sum_x + (q_x - half_x),
-        sum_y + (q_y - half_y),
+        joint_x,
+        joint_y,
+        joint_x - 2.0 * half_x,
+        joint_y - 2.0 * half_y,
+        sum_x + (joint_x - half_x),
+        sum_y + (joint_y - half_y),
     )
 
 
@@ -312,19 +307,19 @@ def accelerate(block, like, wide, stride, links, base, body):
         head = eliminate(block, like, last - i, -1.0, links, l, head)
     if 2 * root == links:
         tail = eliminate(block, like, root - 1, 1.0, links, l, tail)
-    alpha, q_x, q_y = solve_root(block, like, root, links, l, tail, head)
+    alpha, q_x, q_y = solve_root(block, like, root, links, tail, head)
     store(block, row_of(ALPHA, links) + root, alpha)
     half_x, half_y = half_link(block, like, root, links, alpha, l)
-    towards_tail = (alpha, q_x - half_x, q_y - half_y, q_x, q_y)
-    towards_head = (alpha, q_x + half_x, q_y + half_y, like, like)
+    towards_tail = (alpha, q_x, q_y, q_x - half_x, q_y - half_y, q_x, q_y)
+    towards_head = (alpha, q_x, q_y, q_x + half_x, q_y + half_y, like, like)
     if 2 * root == links:
         towards_tail = substitute(block, like, root - 1, 1.0, links, l, towards_tail)
     for i in range(last - root - 1, -1, -1):
         towards_tail = substitute(block, like, i, 1.0, links, l, towards_tail)
         towards_head = substitute(block, like, last - i, -1.0, links, l, towards_head)
     share = 1.0 / links
-    store(block, A_X, share * (towards_tail[3] + towards_head[3]) + load(block, WATER_AX, like))
-    store(block, A_Y, share * (towards_tail[4] + towards_head[4]) + load(block, WATER_AY, like))
+    store(block, A_X, share * (towards_tail[5] + towards_head[5]) + load(block, WATER_AX, like))
+    store(block, A_Y, share * (towards_tail[6] + towards_head[6]) + load(block, WATER_AY, like))
 
 
 @compiled

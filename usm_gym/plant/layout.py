@@ -50,7 +50,7 @@ THETA, OMEGA, SHARE, SIDE, PUSH_T, PUSH_N = range(6)
 SIN, COS, U_X, U_Y, TORQUE, ALPHA = range(6, 12)
 # The link's own answer, see `chain`; once it is eliminated, its back substitution.
 OWN = 12
-SUB_0, SUB_K, SUB_X, SUB_Y = range(OWN, OWN + 4)
+SUB_0, SUB_G, SUB_X, SUB_Y = range(OWN, OWN + 4)
 QUANTITIES = OWN + 9
 
 
