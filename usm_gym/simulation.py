@@ -178,7 +178,7 @@ class Simulation:
             kernel = run_lanes if self._lanes > 1 else run_singles
             kernel(*arguments, 0, len(self._rows))
         # Compiled code assumes finite numbers, so that what is none is found here.
-        distance = np.abs(self.error).max(axis=1) + 0.0 * self.heading_error
+        distance = np.maximum(*np.abs(self.error.T)) + 0.0 * self.heading_error
         np.logical_not(distance <= LOST_ERROR, out=self.lost)
         if self.lost.any():
             self._tidy(self.lost)
