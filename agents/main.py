@@ -8,11 +8,11 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from agents.commands import bench, evaluate, policies, reproduce
+from agents.commands import bench, evaluate, policies, reproduce, tune
 from agents.terminal import Parser
 from usm_gym.validation import in_one_line
 
-COMMANDS = (policies, evaluate, reproduce, bench)
+COMMANDS = (policies, evaluate, tune, reproduce, bench)
 
 DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
@@ -20,6 +20,7 @@ A first look, in half a minute:
 
   usm evaluate                 every policy on the fifty frozen operation scenarios
   usm policies                 what there is to compare
+  usm tune POLICY              better gains for one of them
   usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here
 """

@@ -110,7 +110,7 @@ def score_all(
     """
     require(workers >= 1, "workers", workers, "1 or more")
     outcomes: dict[int, Evaluation | Refusal] = {}
-    batches: list[tuple[Task, int]] = []
+    batches: list[tuple[Task, int, int]] = []
     waiting: dict[int, dict[int, Evaluation | Refusal]] = {}
     places = []
     for index, task in enumerate(tasks):
@@ -121,23 +121,23 @@ def score_all(
             continue
         waiting[index] = {}
         for first in range(0, len(task.scenarios), BATCH):
-            batches.append((task, first))
+            batches.append((task, first, first + BATCH))
             places.append(index)
     for number, outcome in parallel.results(score_batch, batches, workers):
-        task, first = batches[number]
+        task, first, last = batches[number]
         index = places[number]
         parts = waiting[index]
         parts[first] = outcome
-        progress(len(task.scenarios[first : first + BATCH]))
+        progress(len(task.scenarios[first:last]))
         if len(parts) == len(range(0, len(task.scenarios), BATCH)):
             outcomes[index] = _whole([parts[first] for first in sorted(parts)])
             _write(cache, task, outcomes[index])
     return [outcomes[index] for index in range(len(tasks))]
 
 
-def score_batch(task: Task, first: int) -> Evaluation | Refusal:
-    """Score the batch of a task's episodes that begins at `first`."""
-    scenarios = task.scenarios[first : first + BATCH]
+def score_batch(task: Task, first: int, last: int) -> Evaluation | Refusal:
+    """Score the episodes `first` to `last`, this one left out, of a task side by side."""
+    scenarios = task.scenarios[first:last]
     try:
         policy = Timed(task.contender.make(task.nominal), task.time_limit)
         return evaluate(policy, scenarios, robot=task.robot)
@@ -176,7 +176,7 @@ class Timed:
         return answer
 
     def _expire(self) -> NoReturn:
-        raise TimeoutError(f"thinks for more than {self._limit:g} s in a batch of {BATCH} episodes")
+        raise TimeoutError(f"thinks for more than {self._limit:g} s in a batch of episodes")
 
 
 @contextmanager
