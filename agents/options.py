@@ -1,13 +1,15 @@
-"""Options that commands share: conditions, and on what to compute."""
+"""Options that commands share: conditions, what to compute on, where to write."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import logging
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import joblib
@@ -71,3 +73,21 @@ def count(arguments: Any, option: str, default: int, least: int = 1) -> int:
     value = getattr(arguments, option)
     require(value is None or value >= least, f"--{option}", value, f"{least} or more")
     return default if value is None else int(value)
+
+
+def output_folder(name: str) -> Path:
+    """An output folder with figures, made if it is not there.
+
+    Raises:
+        ValueError: If figures cannot be drawn, or nothing can be written there.
+    """
+    require(
+        find_spec("matplotlib") is not None,
+        "--output",
+        name,
+        "nothing, until matplotlib is installed (the extra `render`)",
+    )
+    folder = Path(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    require(os.access(folder, os.W_OK), "--output", name, "a folder that can be written")
+    return folder

@@ -28,11 +28,9 @@ policies:
 """
 
 
-def add_policies(parser: argparse.ArgumentParser) -> None:
+def add_policies(parser: argparse.ArgumentParser, default: str = "all competitors") -> None:
     """Add the option that names policies."""
-    parser.add_argument(
-        "--policies", metavar="A,B", help="names, by commas (default: all competitors)"
-    )
+    parser.add_argument("--policies", metavar="A,B", help=f"names, by commas (default: {default})")
 
 
 def add_scenarios(parser: argparse.ArgumentParser) -> None:

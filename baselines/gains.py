@@ -37,11 +37,13 @@ class GainsFile:
         policy: Id of the policy.
         gains: Its gains by name; those not named are the policy's own.
         budget: What the tuning cost.
+        weight: Cost of thrust variation in the objective, mm per N/s.
     """
 
     policy: str
     gains: dict[str, Number]
     budget: Budget
+    weight: Number
 
 
 _ADAPTER = TypeAdapter(GainsFile)

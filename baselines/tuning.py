@@ -96,7 +96,7 @@ class Problem:
 
     def task(self, gains: dict[str, float], purpose: int) -> Task:
         """The policy with some gains on these scenarios."""
-        file = GainsFile(self.policy, gains, self.budget)
+        file = GainsFile(self.policy, gains, self.budget, self.weight)
         scenarios, robot = self.scenarios(purpose), Robot()
         contender = Contender(self.policy, tuned(file).factory)
         return Task(contender, scenarios, shared_nominal(robot, scenarios), robot)
