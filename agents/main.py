@@ -8,11 +8,20 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from agents.commands import bench, evaluate, policies, reproduce
+from agents.commands import (
+    bench,
+    compare,
+    evaluate,
+    leaderboard,
+    policies,
+    reproduce,
+    robustness,
+    tune,
+)
 from agents.terminal import Parser
 from usm_gym.validation import in_one_line
 
-COMMANDS = (policies, evaluate, reproduce, bench)
+COMMANDS = (policies, evaluate, compare, leaderboard, robustness, tune, reproduce, bench)
 
 DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
@@ -20,6 +29,10 @@ A first look, in half a minute:
 
   usm evaluate                 every policy on the fifty frozen operation scenarios
   usm policies                 what there is to compare
+  usm compare A B              whether one of them is better than another
+  usm leaderboard              all of them on all frozen suites
+  usm robustness --vary noise  how they fare when something gets worse
+  usm tune POLICY              better gains for one of them
   usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here
 """

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from baselines.gains import TUNED, GainsFile, read_gains
 from baselines.pd import PD
 from baselines.policy import Policy
 from baselines.space import Space
@@ -47,7 +48,7 @@ def register(
     slow: bool = False,
     privileged: bool = False,
 ) -> None:
-    """Register a policy.
+    """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
 
     Args:
         id: Its name.
@@ -63,6 +64,24 @@ def register(
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     _entries[id] = Entry(factory, summary, space or {}, slow, privileged)
+    shipped = TUNED / f"{id}.json"
+    if shipped.is_file():
+        _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
+
+
+def tuned(file: GainsFile) -> Entry:
+    """The registered policy that a file of gains is for, with these gains.
+
+    Raises:
+        ValueError: If there is no such policy.
+    """
+    base, budget = entry(file.policy), file.budget
+    return Entry(
+        partial(base.factory, **file.gains),
+        f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
+        slow=base.slow,
+        privileged=base.privileged,
+    )
 
 
 def ids() -> list[str]:

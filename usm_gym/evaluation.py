@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym import metrics
+from usm_gym import metrics, parallel
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.simulation import Simulation
@@ -76,6 +75,16 @@ class Evaluation:
         return row
 
 
+def joined(parts: Sequence[Evaluation]) -> Evaluation:
+    """Scores of one policy on one list of scenarios after the other."""
+    return Evaluation(
+        per_episode={
+            name: np.concatenate([part.per_episode[name] for part in parts]) for name in METRICS
+        },
+        failed=np.concatenate([part.failed for part in parts]),
+    )
+
+
 def evaluate(
     policy: Any,
     scenarios: Sequence[Scenario],
@@ -112,11 +121,13 @@ def evaluate(
     else:
         size = -(-len(scenarios) // workers)
         chunks = [scenarios[i : i + size] for i in range(0, len(scenarios), size)]
-        tasks = (joblib.delayed(_score_all)(policy, chunk, body) for chunk in chunks)
-        rows = []
-        for part in joblib.Parallel(n_jobs=workers, return_as="generator")(tasks):
-            rows.extend(part)
+        done = {}
+        for index, part in parallel.results(
+            _score_all, [(policy, chunk, body) for chunk in chunks], workers
+        ):
+            done[index] = part
             report(len(part))
+        rows = [row for index in sorted(done) for row in done[index]]
     return Evaluation(
         per_episode={name: np.array([row[name] for row in rows]) for name in METRICS},
         failed=np.array([bool(row["failed"]) for row in rows]),
@@ -196,8 +207,15 @@ def _run(
         truth = {"snapshot": simulation.snapshot()} if getattr(policy, "privileged", False) else {}
         start = np.full(size, k == 0)
         seen = simulation.observation.copy()
-        action, state = policy.predict(seen, state, start, deterministic=True, **truth)
-        action = np.asarray(action, np.float32)
+        answer = policy.predict(seen, state, start, deterministic=True, **truth)
+        require(
+            isinstance(answer, tuple) and len(answer) == 2,
+            "what predict returns",
+            type(answer).__name__,
+            "a pair (action, state)",
+        )
+        state = answer[1]
+        action = np.asarray(answer[0], np.float32)
         require(
             action.shape == (size, thrusters),
             "the shape of the policy's action",

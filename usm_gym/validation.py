@@ -31,7 +31,7 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
         raise ValueError(f"{name} is {value!r}; allowed: {allowed}")
 
 
-def in_one_line(error: Exception) -> str:
+def in_one_line(error: BaseException) -> str:
     """Say on one line what an exception says, each wrong field with its value."""
     if not isinstance(error, ValidationError):
         return " ".join(str(error).split())

@@ -3,39 +3,46 @@
 from __future__ import annotations
 
 import argparse
-import json
-from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from agents.terminal import figures, output_console, progress_bar
-from baselines.policy import Policy
-from baselines.registry import entry, ids, make
-from usm_gym.evaluation import evaluate
+from agents.selection import (
+    POLICIES,
+    add_policies,
+    add_scenarios,
+    add_scoring,
+    chosen_contenders,
+    chosen_scenarios,
+    leave_if_refused,
+    scored,
+    seeds,
+    suite_name,
+    tasks,
+)
+from agents.terminal import figures, mm, output_console
+from baselines.scoring import Refusal
 from usm_gym.files import check_writable, write_json
-from usm_gym.nominal import nominal_of
 from usm_gym.provenance import provenance
-from usm_gym.robot import Robot
-from usm_gym.scenario import MODES, Conditions, Mode, Scenario, conditions_of, sample
-from usm_gym.seeding import EVALUATION, stream
-from usm_gym.suites import NAMES, suite
-from usm_gym.validation import in_one_line, require
 
 DESCRIPTION = """\
 Score policies: per episode and axis, the largest true position error after settling (5 s), as in
 Table 1 of the paper. All policies meet the same scenarios and the same noise. Printed are means
-over episodes with 95 % bootstrap intervals; a lost robot counts 0.5 m or more in both axes.
+over episodes with 95 % bootstrap intervals; a lost robot counts 0.5 m or more in both axes. A
+policy that fails to act is left out of the table, with the reason on a line of its own, status 1.
 """
-EXAMPLES = """\
+EXAMPLES = f"""\
+{POLICIES}
 examples:
   usm evaluate                                          all competitors, fifty frozen scenarios
   usm evaluate --policies sta,pd --suite torpedo        two of them in torpedo mode
   usm evaluate --policies sta --seed 7 --episodes 200   sampled scenarios
   usm evaluate --conditions ideal                       the suite without noise, lag and current
-  usm evaluate --conditions '{"position_noise": 0}'     one field other than in "field"
+  usm evaluate --conditions '{{"position_noise": 0}}'     one field other than in "field"
   usm evaluate --policies sta --output sta.json         keep everything, episode by episode
+  usm evaluate --policies sta,sta@gains.json            gains of one's own, see usm tune
+  usm evaluate --policies sta,my_module:MyController    a controller of one's own
 """
 
 
@@ -48,24 +55,10 @@ def add_to(subparsers: Any) -> None:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add = parser.add_argument
-    add("--policies", metavar="A,B", help="names, by commas (default: all competitors)")
-    add(
-        "--suite",
-        metavar="NAME",
-        help=f"frozen suite ({', '.join(NAMES)}; default: operation) or a file of scenarios",
-    )
-    add("--seed", type=int, metavar="S", help="sample scenarios under this seed instead")
-    add("--episodes", type=int, metavar="N", help="how many to sample (default: 50)")
-    add("--mode", choices=MODES, help="mode of sampled scenarios (default: operation)")
-    add(
-        "--conditions",
-        metavar="C",
-        help="ideal, field, rough, or a JSON object of fields on top of field; "
-        "on a suite it overrides the suite's own (default: the suite's; field)",
-    )
-    add("--workers", type=int, default=1, metavar="N", help="processes (default: 1)")
-    add("--output", metavar="FILE", help="write the results as JSON")
+    add_policies(parser)
+    add_scenarios(parser)
+    add_scoring(parser)
+    parser.add_argument("--output", metavar="FILE", help="write the results as JSON")
     parser.set_defaults(run=run)
 
 
@@ -73,25 +66,18 @@ def run(arguments: argparse.Namespace) -> None:
     """Evaluate, print the table, write the file."""
     if arguments.output:
         check_writable(arguments.output)
-    conditions = None if arguments.conditions is None else parse_conditions(arguments.conditions)
-    scenarios = chosen_scenarios(arguments, conditions)
-    robot = Robot()
-    policies = chosen_policies(arguments.policies, robot, scenarios)
+    scenarios = chosen_scenarios(arguments)
+    chosen = tasks(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
     results: dict[str, Any] = {}
-    with progress_bar() as bar:
-        task = bar.add_task("", total=len(policies) * len(scenarios))
-        for id, policy in policies.items():
-            bar.update(task, description=id)
-            scores = evaluate(
-                policy,
-                scenarios,
-                robot=robot,
-                workers=arguments.workers,
-                progress=lambda episodes: bar.advance(task, episodes),
-            )
-            results[id] = scores.summary()
-    name = None if sampled(arguments) else arguments.suite or "operation"
-    output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))
+    refused: dict[str, str] = {}
+    for task, outcome in zip(chosen, scored(chosen, arguments), strict=True):
+        if isinstance(outcome, Refusal):
+            refused[task.contender.name] = outcome.reason
+        else:
+            results[task.contender.name] = outcome.summary()
+    name = suite_name(arguments)
+    if results:
+        output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))
     if arguments.output:
         document = {
             "suite": name,
@@ -101,82 +87,11 @@ def run(arguments: argparse.Namespace) -> None:
             "episodes": len(scenarios),
             "scenarios": [scenario.to_dict() for scenario in scenarios],
             "results": results,
-            "provenance": provenance(
-                {"seed": arguments.seed or 0} if sampled(arguments) else {"suite": name}
-            ),
+            "refused": refused,
+            "provenance": provenance(seeds(arguments)),
         }
         write_json(arguments.output, document)
-
-
-def sampled(arguments: argparse.Namespace) -> bool:
-    """Whether scenarios are to be sampled."""
-    return any(value is not None for value in (arguments.seed, arguments.episodes, arguments.mode))
-
-
-def chosen_scenarios(
-    arguments: argparse.Namespace, conditions: Conditions | None
-) -> list[Scenario]:
-    """The scenarios that the arguments ask for."""
-    if not sampled(arguments):
-        scenarios = read_suite(arguments.suite or "operation")
-        return [each.under(conditions) for each in scenarios] if conditions else scenarios
-    require(
-        arguments.suite is None,
-        "--suite",
-        arguments.suite,
-        "no suite beside --seed, --episodes, --mode",
-    )
-    episodes = 50 if arguments.episodes is None else arguments.episodes
-    seed = arguments.seed or 0
-    require(episodes >= 1, "--episodes", episodes, "1 or more")
-    require(seed >= 0, "--seed", seed, "0 or more")
-    mode: Mode = arguments.mode or "operation"
-    return [
-        sample(mode, conditions or Conditions(), stream(seed, EVALUATION, i))
-        for i in range(episodes)
-    ]
-
-
-def read_suite(name: str) -> list[Scenario]:
-    """The scenarios of a frozen suite, or of a JSON file that holds a list of them."""
-    if not name.endswith(".json"):
-        return suite(name)
-    try:
-        listed = json.loads(Path(name).read_text(encoding="utf-8"))["scenarios"]
-        require(isinstance(listed, list) and listed, "scenarios", listed, "a list of one or more")
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{name} is no file of scenarios: {error!r}") from error
-    scenarios = []
-    for index, data in enumerate(listed):
-        try:
-            scenarios.append(Scenario.from_dict(data))
-        except ValueError as error:
-            raise ValueError(f"{name}, scenario {index}: {in_one_line(error)}") from error
-    return scenarios
-
-
-def parse_conditions(text: str) -> Conditions:
-    """Conditions from a preset's name or a JSON object."""
-    if text.lstrip()[:1] not in ("{", "["):
-        return conditions_of(text)
-    try:
-        return conditions_of(json.loads(text))
-    except json.JSONDecodeError as error:
-        raise ValueError(f"--conditions is {text!r}: no JSON ({error})") from error
-
-
-def chosen_policies(
-    names: str | None, robot: Robot, scenarios: list[Scenario]
-) -> dict[str, Policy]:
-    """Policies by name, made from the nominal knowledge that goes with the scenarios."""
-    if names is None:
-        chosen = [id for id in ids() if not (entry(id).slow or entry(id).privileged)]
-    else:
-        chosen = [name.strip() for name in names.split(",") if name.strip()]
-    require(len(chosen) > 0, "--policies", names, "one name or more")
-    nominal, *others = {nominal_of(robot, scenario) for scenario in scenarios}
-    require(not others, "scenarios", f"{len(others) + 1} kinds", "one nominal knowledge for all")
-    return {name: make(name, nominal) for name in chosen}
+    leave_if_refused(refused)
 
 
 def table(results: dict[str, Any], title: str) -> Table:
@@ -204,8 +119,3 @@ def table(results: dict[str, Any], title: str) -> Table:
         cells += [figures(row[key]["mean"]) for key in ("thrust_effort", "thrust_variation")]
         rows.add_row(name, *cells, str(row["failures"]))
     return rows
-
-
-def mm(metres: float) -> str:
-    """A length in mm to three figures."""
-    return figures(1e3 * metres)

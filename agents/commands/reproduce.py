@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from agents.options import output_folder
 from agents.terminal import figures, output_console, progress_bar
 from baselines.reproduction import (
     HEADING_GAIN,
@@ -25,7 +24,6 @@ from baselines.reproduction import (
 from usm_gym.files import write_json, write_text
 from usm_gym.provenance import provenance
 from usm_gym.scenario import MODES, Scenario, named
-from usm_gym.validation import require
 
 DESCRIPTION = """\
 Run the paper as printed: explicit laws and observer at a step of 1e-5 s, ideal thrusters without
@@ -50,7 +48,7 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Run all cases, print the table, write the folder."""
-    folder = None if arguments.output is None else prepared(Path(arguments.output))
+    folder = None if arguments.output is None else output_folder(arguments.output)
     chosen = cases()
     with progress_bar() as bar:
         task = bar.add_task("runs", total=len(chosen))
@@ -78,19 +76,6 @@ def run(arguments: argparse.Namespace) -> None:
     from baselines.reproduction_figures import draw_all
 
     draw_all(records, folder)
-
-
-def prepared(folder: Path) -> Path:
-    """The output folder, made if it is not there, once it is sure that all of it can be written."""
-    require(
-        find_spec("matplotlib") is not None,
-        "--output",
-        str(folder),
-        "nothing, until matplotlib is installed (the extra `render`)",
-    )
-    folder.mkdir(parents=True, exist_ok=True)
-    require(os.access(folder, os.W_OK), "--output", str(folder), "a folder that can be written")
-    return folder
 
 
 def lines(rows: dict[str, Any]) -> list[list[str]]:

@@ -1,0 +1,104 @@
+"""The leaderboard as Markdown, as CSV, and as the table in the README."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from agents.terminal import figures, mm
+from baselines.leaderboard import MAIN, Document
+from usm_gym.validation import require
+
+MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
+COLUMNS = (
+    "x, mm",
+    "y, mm",
+    "middle half x",
+    "middle half y",
+    "worst x",
+    "worst y",
+    "thrust, N",
+    "variation, N/s",
+    "lost",
+    "beats the next",
+)
+LEGEND = """\
+Largest position error after settling, mm: mean over the episodes with its 95 % interval, mean of
+the middle half of the episodes, worst episode. Rows are ordered by the sum of the means in x and y.
+"Beats the next" says whether the interval of the paired difference to the next row leaves out 0,
+and with what probability an episode goes better.
+"""
+SCORES = (
+    *(f"{name}_{axis}" for name in ("max_error", "settled_error", "rms_error") for axis in "xy"),
+    "heading_error",
+    "thrust_effort",
+    "thrust_variation",
+)
+
+
+def table(rows: Mapping[str, Any]) -> str:
+    """The rows of a suite as Markdown."""
+    lines = [f"| policy | {' | '.join(COLUMNS)} |", "|---|" + "---:|" * len(COLUMNS)]
+    for id, each in rows.items():
+        cells = [id if each["competitor"] else f"{id} (no competitor)"]
+        errors = [each[f"max_error_{axis}"] for axis in "xy"]
+        cells += [f"{mm(e['mean'])} [{mm(e['ci95'][0])}, {mm(e['ci95'][1])}]" for e in errors]
+        cells += [mm(e["iqm"]) for e in errors] + [mm(e["worst"]) for e in errors]
+        cells += [figures(each[key]["mean"]) for key in ("thrust_effort", "thrust_variation")]
+        beats = each.get("beats_next")
+        decision = "" if beats is None else "yes" if beats["decided"] else "undecided"
+        probability = "" if beats is None else f" ({beats['probability']:.2f})"
+        lines.append(
+            "| " + " | ".join([*cells, str(each["failures"]), decision + probability]) + " |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def markdown(found: Document) -> str:
+    """The whole leaderboard as Markdown, the main suite's table between the marks of the README."""
+    parts = [f"# Leaderboard of usm-gym {found['version']}\n", LEGEND]
+    for name, rows in found["suites"].items():
+        episodes = len(next(iter(rows.values()))["per_episode"]["failed"])
+        parts.append(f"## {name} ({episodes} episodes)\n")
+        parts.append(readme_block(found) if name == MAIN else table(rows))
+        for id, reason in found["refused"].get(name, {}).items():
+            parts.append(f"{id} is refused: {reason}\n")
+    return "\n".join(parts)
+
+
+def readme_block(found: Document) -> str:
+    """The main suite's table between its marks, as the README shows it."""
+    return f"{MARKS[0]}\n{table(found['suites'][MAIN])}{MARKS[1]}\n"
+
+
+def with_table(page: str, found: Document) -> str:
+    """A page with the main suite's table put between its marks.
+
+    Raises:
+        ValueError: If the page lacks the marks.
+    """
+    pattern = re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1]) + "\n"
+    block = readme_block(found)
+    changed, count = re.subn(pattern, lambda match: block, page, flags=re.DOTALL)
+    require(count == 1, "marks of the table", count, f"one pair, {MARKS[0]} to {MARKS[1]}")
+    return changed
+
+
+def csv_text(found: Document) -> str:
+    """One line for each policy on each suite; errors in m, thrust in N, variation in N/s."""
+    head = ["suite", "policy", "competitor", "failures"]
+    for name in SCORES:
+        head += [name, f"{name}_low", f"{name}_high", f"{name}_worst"]
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(head)
+    for suite_name, rows in found["suites"].items():
+        for id, each in rows.items():
+            line = [suite_name, id, each["competitor"], each["failures"]]
+            for name in SCORES:
+                line += [each[name]["mean"], *each[name]["ci95"], each[name]["worst"]]
+            writer.writerow(line)
+    return out.getvalue()

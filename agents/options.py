@@ -1,0 +1,93 @@
+"""Options that commands share: conditions, what to compute on, where to write."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import joblib
+
+from usm_gym.scenario import Conditions, conditions_of
+from usm_gym.validation import require
+
+
+def add_computing(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say on what to compute."""
+    add = parser.add_argument
+    add("--workers", type=int, metavar="N", help="processes (default: 1; of a cluster: all)")
+    add("--cluster", metavar="ADDRESS", help="a Ray cluster to compute on (the extra `cluster`)")
+
+
+@contextmanager
+def computing(arguments: argparse.Namespace) -> Iterator[int]:
+    """Make the cluster that the options ask for joblib's backend; gives the number of workers."""
+    workers = arguments.workers
+    require(workers is None or workers >= 1, "--workers", workers, "1 or more")
+    if arguments.cluster is None:
+        yield workers or 1
+        return
+    require(
+        find_spec("ray") is not None,
+        "--cluster",
+        arguments.cluster,
+        "nothing, until Ray is installed (the extra `cluster`)",
+    )
+    import ray
+    from ray.util.joblib import register_ray
+
+    try:
+        ray.init(address=arguments.cluster, logging_level=logging.ERROR, log_to_driver=False)
+    except (ConnectionError, RuntimeError) as error:
+        raise ConnectionError(f"no Ray cluster at {arguments.cluster}: {error}") from error
+    try:
+        register_ray()
+        with joblib.parallel_config(backend="ray"):
+            yield workers or int(ray.cluster_resources().get("CPU", 1))
+    finally:
+        ray.shutdown()
+
+
+def parse_conditions(text: str) -> Conditions:
+    """Conditions from a preset's name or a JSON object."""
+    if text.lstrip()[:1] not in ("{", "["):
+        return conditions_of(text)
+    try:
+        return conditions_of(json.loads(text))
+    except json.JSONDecodeError as error:
+        raise ValueError(f"--conditions is {text!r}: no JSON ({error})") from error
+
+
+def count(arguments: Any, option: str, default: int, least: int = 1) -> int:
+    """An integer option, or its default.
+
+    Raises:
+        ValueError: If it is too small.
+    """
+    value = getattr(arguments, option)
+    require(value is None or value >= least, f"--{option}", value, f"{least} or more")
+    return default if value is None else int(value)
+
+
+def output_folder(name: str) -> Path:
+    """An output folder with figures, made if it is not there.
+
+    Raises:
+        ValueError: If figures cannot be drawn, or nothing can be written there.
+    """
+    require(
+        find_spec("matplotlib") is not None,
+        "--output",
+        name,
+        "nothing, until matplotlib is installed (the extra `render`)",
+    )
+    folder = Path(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    require(os.access(folder, os.W_OK), "--output", name, "a folder that can be written")
+    return folder
