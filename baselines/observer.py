@@ -13,21 +13,22 @@ from usm_gym.plant.compile import piece
 from usm_gym.plant.elementary import cube_root
 from usm_gym.validation import require
 
+# Exponent of L in k2: that printed in the paper, and the one that homogeneity asks for.
+PRINTED, HOMOGENEOUS = 0.5, 2 / 3
+
 
 def check_observer(L: float, k2_exponent: float) -> None:
     """Refuse a gain of 0 and an exponent that is neither printed nor homogeneous."""
     require(L > 0, "observer_gain", L, "a number > 0")
-    require(k2_exponent in (0.5, 2 / 3), "k2_exponent", k2_exponent, "0.5 or 2/3")
+    allowed = (PRINTED, HOMOGENEOUS)
+    require(k2_exponent in allowed, "k2_exponent", k2_exponent, "0.5 or 2/3")
 
 
 @piece
 def observer_gains(L, k2_exponent):
-    """(k1, k2, k3) = (6 L^(1/3), 11 L^k2_exponent, 6 L); the paper prints the exponent 1/2.
-
-    Homogeneity asks for 2/3, the only other exponent that is allowed.
-    """
+    """(k1, k2, k3) = (6 L^(1/3), 11 L^k2_exponent, 6 L)."""
     root = cube_root(L)
-    k2 = 11.0 * (np.sqrt(L) if k2_exponent == 0.5 else root * root)
+    k2 = 11.0 * (np.sqrt(L) if k2_exponent == PRINTED else root * root)
     return 6.0 * root, k2, 6.0 * L
 
 
@@ -110,3 +111,19 @@ def observe(implicit, started, y, u, velocity, h, k, state):
     if implicit:
         return implicit_observer(y, u, h, k, state)
     return explicit_observer(y, u, h, k, state)
+
+
+@piece
+def compensating_force(z1, z2, acceleration, mass, surface, u, state):
+    """The force (19), N, which makes sigma' = u for the estimated sigma = surface p1 + p2.
+
+    Args:
+        z1: First correction of the observer, m/s.
+        z2: Second correction of the observer, m/s^2.
+        acceleration: Acceleration of the reference, m/s^2.
+        mass: Total mass m_t, kg.
+        surface: lambda of (10), 1/s.
+        u: What sigma' is to be, m/s^2.
+        state: (p1, p2, p3, e) of the observer.
+    """
+    return mass * (-surface * (state[1] + z1) - state[2] - z2 + acceleration + u)

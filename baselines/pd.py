@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from baselines.observer import check_observer, observe, observer_gains
+from baselines.observer import check_observer, compensating_force, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
@@ -55,7 +55,7 @@ def pd_force(z1, z2, acceleration, mass, gains, reading, state):
         return u_pd
     if reading == MASS:
         return mass * (acceleration + u_pd)
-    return mass * (-gains.surface * (state[1] + z1) - state[2] - z2 + acceleration + u_pd)
+    return compensating_force(z1, z2, acceleration, mass, gains.surface, u_pd, state)
 
 
 @compiled

@@ -7,11 +7,13 @@ that the caller carries from call to call, in the manner of Stable-Baselines3's 
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from baselines.space import Range
 from usm_gym.nominal import Nominal
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant.compile import compiled, piece
@@ -30,6 +32,9 @@ from usm_gym.plant.thrusters import allocate, allocation_matrix
 from usm_gym.validation import require
 
 Array = NDArray[np.float64]
+
+# Where the heading controller, which all laws share, is tuned.
+HEADING_RANGE = Range(30.0, 300.0, "N m/rad")
 
 
 class Policy(Protocol):
@@ -80,6 +85,7 @@ class Signals(NamedTuple):
         velocity: Velocity of the reference, m/s, (batch, 2).
         acceleration: Acceleration of the reference, m/s^2, (batch, 2).
         allocation: Allocation matrices, (batch, 3, thrusters).
+        observation: All that is measured, to be read with `value`, (batch, numbers).
     """
 
     started: Array
@@ -88,6 +94,7 @@ class Signals(NamedTuple):
     velocity: Array
     acceleration: Array
     allocation: Array
+    observation: NDArray[np.float32]
 
 
 def model_of(nominal: Nominal) -> Model:
@@ -114,16 +121,16 @@ def value(observation, model, entry, index):
 
 
 @compiled
-def sense(observation, state, model, signals):
-    """Fill in the signals from observations and the shared part of the state.
+def sense(state, model, signals):
+    """Fill in the signals from the observations among them and the shared part of the state.
 
     The applied force is the last command after saturation, projected with the link angles at the
     time of that command, which the state has kept.
     """
     thrusters = model.thruster_links.size
     sine, cosine = np.empty(model.links), np.empty(model.links)
-    for b in range(observation.shape[0]):
-        seen = observation[b]
+    for b in range(signals.observation.shape[0]):
+        seen = signals.observation[b]
         signals.started[b] = state[b, 0]
         limit = value(seen, model, THRUSTER_LIMIT, 0)
         for axis in range(2):
@@ -192,12 +199,17 @@ class ScriptedPolicy:
         self._model = model_of(nominal)
         self._thrusters = len(nominal.robot.thrusters)
 
+    @property
+    def law_shape(self) -> tuple[int, ...]:
+        """Shape of the law's state for one robot; by default `law_size` numbers for each axis."""
+        return (2, self.law_size)
+
     def force(self, signals: Signals, law_state: Array) -> Array:
         """The force on the centre of mass, N, (batch, 2); the law's state is advanced in place.
 
         Args:
             signals: What the law works with.
-            law_state: The law's own state, (batch, 2, law_size), zero at the start.
+            law_state: The law's own state, (batch, *law_shape), zero at the start.
         """
         raise NotImplementedError
 
@@ -241,9 +253,9 @@ class ScriptedPolicy:
         size, thrusters = len(observation), self._thrusters
         y, u, velocity, acceleration = np.empty((4, size, 2))
         allocation = np.empty((size, 3, thrusters))
-        signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation)
-        sense(observation, state, self._model, signals)
-        law_state = state[:, 1 + 2 * thrusters :].reshape(size, 2, self.law_size)
+        signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
+        sense(state, self._model, signals)
+        law_state = state[:, 1 + 2 * thrusters :].reshape(size, *self.law_shape)
         force = self.force(signals, law_state)
         # Where the reshape had to copy, the advanced state has to be written back.
         state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)
@@ -253,7 +265,7 @@ class ScriptedPolicy:
         return action
 
     def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:
-        numbers = 1 + 2 * self._thrusters + 2 * self.law_size
+        numbers = 1 + 2 * self._thrusters + math.prod(self.law_shape)
         if state is None:
             return np.zeros((size, numbers))
         new = np.array(state, np.float64)

@@ -8,8 +8,19 @@ from functools import partial
 from typing import Any
 
 from baselines.gains import TUNED, GainsFile, read_gains
+from baselines.generalised_super_twisting import (
+    ADAPTIVE_SPACE,
+    GENERALISED_SPACE,
+    AdaptiveGeneralisedSuperTwisting,
+    GeneralisedSuperTwisting,
+)
+from baselines.ladrc import LADRC, LADRC_SPACE
+from baselines.lqg import LQG, LQG_SPACE
+from baselines.mpc import MPC, MPC_SPACE
 from baselines.pd import PD
+from baselines.pid import PID, PID_SPACE
 from baselines.policy import Policy
+from baselines.sliding_mode import SLIDING_MODE_SPACE, SlidingMode
 from baselines.space import Space
 from baselines.super_twisting import SuperTwisting
 from baselines.zero import Zero
@@ -145,5 +156,37 @@ register(
     "pd-observer",
     partial(PD, reading="observer"),
     "PD (21) in the place of u_STA in (19), the paper's words to the letter",
+)
+register("pid", PID, "PID, filtered derivative, anti-windup", space=PID_SPACE)
+register(
+    "ladrc",
+    LADRC,
+    "linear active-disturbance rejection: extended-state observer and pole placement",
+    space=LADRC_SPACE,
+)
+register(
+    "lqg",
+    LQG,
+    "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
+    space=LQG_SPACE,
+)
+register("mpc", MPC, "predictive control on the nominal plant, joint motion known", space=MPC_SPACE)
+register(
+    "smc",
+    SlidingMode,
+    "sliding mode with boundary layer and integral action",
+    space=SLIDING_MODE_SPACE,
+)
+register(
+    "gsta",
+    GeneralisedSuperTwisting,
+    "generalised super-twisting on the paper's observer",
+    space=GENERALISED_SPACE,
+)
+register(
+    "agsta",
+    AdaptiveGeneralisedSuperTwisting,
+    "the same with the paper's adaptation of its gains",
+    space=ADAPTIVE_SPACE,
 )
 register("zero", Zero, "no thrust")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.observer import check_observer, observe, observer_gains
+from baselines.observer import check_observer, compensating_force, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
@@ -102,7 +102,7 @@ def super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, state):
         u_sta, state[4], state[5] = implicit_super_twisting(sigma, h, gains, state[4], state[5])
     else:
         u_sta, state[4], state[5] = explicit_super_twisting(sigma, h, gains, state[4], state[5])
-    return mass * (-gains.surface * (state[1] + z1) - state[2] - z2 + acceleration + u_sta)
+    return compensating_force(z1, z2, acceleration, mass, gains.surface, u_sta, state)
 
 
 @compiled

@@ -1,0 +1,265 @@
+"""What the nominal robot will do: its plant, run ahead from what is measured and estimated.
+
+Link angles and rates, joint references and thruster commands are known on board; position and
+velocity of the centre of mass and what the nominal model leaves out, an acceleration d, come from a
+Kalman filter with the gains of `kalman`, whose prediction step is the nominal plant. The future of
+the joint references is that of a critically damped filter of an assumed frequency, from their
+present value, rate and acceleration. Water at rest; its current ends up in d.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from baselines.policy import Array, Model, Signals, value
+from usm_gym.nominal import Nominal
+from usm_gym.plant.compile import compiled, piece
+from usm_gym.plant.lanes import WIDTH, block_at, spread
+from usm_gym.plant.layout import *
+from usm_gym.plant.measure import (
+    JOINT_ANGLES,
+    JOINT_RATES,
+    JOINT_REFERENCE_ACCELERATIONS,
+    JOINT_REFERENCE_RATES,
+    JOINT_REFERENCES,
+    POSITION_ERROR,
+    REFERENCE_ACCELERATION,
+    REFERENCE_VELOCITY,
+    TAIL_ANGLE,
+    TAIL_RATE,
+    THRUSTER_COMMAND,
+    THRUSTER_LIMIT,
+)
+from usm_gym.plant.motion import filter_coefficients, lag_share
+from usm_gym.plant.step import Plant, advance
+
+# Physics steps of a prediction in a control period.
+SUBSTEPS = 5
+# The frequency that is assumed of the joint references' filter, rad/s.
+REFERENCE_FREQUENCY = 9.0
+
+
+class NominalPlant(NamedTuple):
+    """The nominal robot in the form that kernels take.
+
+    Attributes:
+        plant: What the plant's kernels take.
+        row: The numbers of a robot that do not change, (rows,).
+        frequency: Assumed frequency of the joint references' filter, rad/s.
+    """
+
+    plant: Plant
+    row: Array
+    frequency: float
+
+
+def nominal_plant(nominal: Nominal) -> NominalPlant:
+    """The nominal robot for kernels."""
+    robot = nominal.robot
+    links, h = robot.links, nominal.control_period / SUBSTEPS
+    row = np.zeros(rows(links, len(robot.thrusters)))
+    row[C_T : LAMBDA_3 + 1] = robot.hydrodynamic_coefficients
+    row[STIFFNESS], row[DAMPING] = robot.joint_stiffness, robot.joint_damping
+    row[JOINT_INERTIA] = h * robot.joint_damping + h**2 * robot.joint_stiffness
+    row[FILTER_DD : FILTER_DAMPING + 1] = filter_coefficients(REFERENCE_FREQUENCY, h)
+    row[SHIFT_TIME] = -1.0
+    row[LAG] = lag_share(nominal.thruster_time_constant, h)
+    side = row_of(SIDE, links)
+    row[side : side + links] = sides(links)
+    plant = Plant(
+        l=robot.half_length,
+        m=robot.link_mass,
+        J=robot.link_inertia,
+        implicit=h,
+        kirchhoff=1.0,
+        links=links,
+        thruster_links=robot.thruster_links,
+        thruster_is_normal=robot.thruster_is_normal,
+        h=h,
+        substeps=SUBSTEPS,
+        shifts=1,
+        moving_water=False,
+    )
+    return NominalPlant(plant, row, REFERENCE_FREQUENCY)
+
+
+@piece
+def place_references(seen, model, frequency, block, lane):
+    """Set the joint references of a robot and the deflection that they are on their way to.
+
+    Each joint has a share of one deflection D. The vectors of references, rates and accelerations
+    are all multiples of the shares; the shares are taken from all three together.
+    """
+    joints = model.links - 1
+    D, rate, acceleration = 0.0, 0.0, 0.0
+    for i in range(joints):
+        D += value(seen, model, JOINT_REFERENCES, i)
+        rate += value(seen, model, JOINT_REFERENCE_RATES, i)
+        acceleration += value(seen, model, JOINT_REFERENCE_ACCELERATIONS, i)
+    w = frequency
+    by_rate, by_acceleration = rate / (w * w), acceleration / (w * w * w * w)
+    size = D * D + rate * by_rate + acceleration * by_acceleration
+    for i in range(joints):
+        part = D * value(seen, model, JOINT_REFERENCES, i)
+        part += by_rate * value(seen, model, JOINT_REFERENCE_RATES, i)
+        part += by_acceleration * value(seen, model, JOINT_REFERENCE_ACCELERATIONS, i)
+        block[(row_of(SHARE, model.links) + i) * WIDTH + lane] = part / max(size, 1e-30)
+    block[DEFLECTION * WIDTH + lane] = D
+    block[DEFLECTION_RATE * WIDTH + lane] = rate
+    block[SHIFT_SIZE * WIDTH + lane] = D + (acceleration / w + 2.0 * rate) / w
+
+
+@piece
+def place(seen, model, nominal, estimate, thrust, applied, block, lane):
+    """Put a robot where an observation and the estimates say it is.
+
+    Args:
+        seen: Observation.
+        model: Nominal knowledge for reading it.
+        nominal: The nominal robot.
+        estimate: (e, v, d) of each axis, (2, 3).
+        thrust: Forces of the thrusters, N.
+        applied: The observation that tells the commands over the coming period.
+        block: Block of the robot, (rows * WIDTH,).
+        lane: Its place in the block.
+    """
+    links, thrusters = model.links, model.thruster_links.size
+    for r in range(nominal.row.size):
+        block[r * WIDTH + lane] = nominal.row[r]
+    theta = value(seen, model, TAIL_ANGLE, 0)
+    omega = value(seen, model, TAIL_RATE, 0)
+    for i in range(links):
+        if i > 0:
+            theta -= value(seen, model, JOINT_ANGLES, i - 1)
+            omega -= value(seen, model, JOINT_RATES, i - 1)
+        block[(row_of(THETA, links) + i) * WIDTH + lane] = theta
+        block[(row_of(OMEGA, links) + i) * WIDTH + lane] = omega
+    for axis in range(2):
+        block[(P_X + axis) * WIDTH + lane] = estimate[axis, 0]
+        velocity = estimate[axis, 1] + value(seen, model, REFERENCE_VELOCITY, axis)
+        block[(V_X + axis) * WIDTH + lane] = velocity
+        # All water accelerating by d accelerates the centre of mass by d and turns nothing.
+        block[(WATER_AX + axis) * WIDTH + lane] = estimate[axis, 2]
+    place_references(seen, model, nominal.frequency, block, lane)
+    limit = value(applied, model, THRUSTER_LIMIT, 0)
+    first = first_command(links)
+    for j in range(thrusters):
+        command = value(applied, model, THRUSTER_COMMAND, j) * limit
+        block[(first + j) * WIDTH + lane] = command
+        block[(first + thrusters + j) * WIDTH + lane] = thrust[j]
+
+
+@compiled
+def advance_all(blocks, plant):
+    """Advance all blocks, (blocks, rows * WIDTH), by a control period."""
+    like = spread(0.0)
+    for k in range(blocks.shape[0]):
+        advance(block_at(blocks, k, like), like, spread(0.0), 1, plant)
+
+
+@piece
+def error_ahead(seen, model, time, axis, block, lane):
+    """(error, rate) of a robot placed at `seen`, after `time`; the reference's jerk is left out."""
+    velocity = value(seen, model, REFERENCE_VELOCITY, axis)
+    acceleration = value(seen, model, REFERENCE_ACCELERATION, axis)
+    e = block[(P_X + axis) * WIDTH + lane] - time * (velocity + 0.5 * time * acceleration)
+    v = block[(V_X + axis) * WIDTH + lane] - velocity - time * acceleration
+    return e, v
+
+
+@compiled
+def place_all(observation, model, nominal, estimates, thrust, applied, blocks):
+    """`place` every robot of a batch, lane by lane; lanes that are left over stay idle."""
+    for b in range(observation.shape[0]):
+        block, lane = blocks[b // WIDTH], b % WIDTH
+        place(observation[b], model, nominal, estimates[b], thrust[b], applied[b], block, lane)
+
+
+@compiled
+def update(observation, before, started, model, correction, blocks, estimates, thrust):
+    """Read the predicted estimates of a batch off its blocks and correct them."""
+    thrusters = model.thruster_links.size
+    for b in range(observation.shape[0]):
+        seen, block, lane = observation[b], blocks[b // WIDTH], b % WIDTH
+        for axis in range(2):
+            y = value(seen, model, POSITION_ERROR, axis)
+            own = estimates[b, axis]
+            if started[b] == 0.0:
+                own[0], own[1], own[2] = y, -value(seen, model, REFERENCE_VELOCITY, axis), 0.0
+            else:
+                own[0], own[1] = error_ahead(before[b], model, model.h, axis, block, lane)
+                innovation = y - own[0]
+                for i in range(3):
+                    own[i] += correction[axis, i] * innovation
+        for j in range(thrusters):
+            row = first_command(model.links) + thrusters + j
+            thrust[b, j] = block[row * WIDTH + lane] if started[b] > 0.0 else 0.0
+
+
+@compiled
+def read_ahead(observation, model, time, blocks, ahead):
+    """Read (error, rate) of a batch off its blocks, `time` after the observations."""
+    for b in range(observation.shape[0]):
+        for axis in range(2):
+            block, lane = blocks[b // WIDTH], b % WIDTH
+            ahead[b, axis] = error_ahead(observation[b], model, time, axis, block, lane)
+
+
+class Predictor:
+    """Estimates where the robots of a batch are, and foresees where they will be.
+
+    Its state is an array of numbers for each robot: (e, v, d) of either axis, the forces of the
+    thrusters in N, the last observation.
+
+    Attributes:
+        size: How many numbers that is.
+    """
+
+    def __init__(self, nominal: Nominal, model: Model, correction: Array) -> None:
+        """Keep the nominal robot.
+
+        Args:
+            nominal: Nominal knowledge.
+            model: The same for kernels.
+            correction: Gains of the filter on (e, v, d), (2, 3).
+        """
+        self._plant, self._model, self._correction = nominal_plant(nominal), model, correction
+        self._thrusters = len(nominal.robot.thrusters)
+        self.size = 6 + self._thrusters + model.scale.size
+
+    def estimate(self, signals: Signals, state: Array) -> Array:
+        """Bring the state to the present and return the estimates (e, v, d), (batch, 2, 3)."""
+        model, seen = self._model, signals.observation
+        estimates, thrust, before = self._parts(state)
+        blocks = self._blocks(before, estimates, thrust, seen)
+        advance_all(blocks, self._plant.plant)
+        update(seen, before, signals.started, model, self._correction, blocks, estimates, thrust)
+        state[:, :6] = estimates.reshape(-1, 6)
+        before[:] = seen
+        return estimates
+
+    def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
+        """Where an estimated robot goes if its last commands are held.
+
+        Returns:
+            Error and its rate after each period, m and m/s, (periods, batch, 2 axes, 2).
+        """
+        seen = signals.observation
+        estimates, thrust, _ = self._parts(state)
+        blocks = self._blocks(seen, estimates, thrust, seen)
+        ahead = np.empty((periods, len(seen), 2, 2))
+        for i in range(periods):
+            advance_all(blocks, self._plant.plant)
+            read_ahead(seen, self._model, (i + 1) * self._model.h, blocks, ahead[i])
+        return ahead
+
+    def _parts(self, state: Array) -> tuple[Array, Array, Array]:
+        estimates = state[:, :6].reshape(-1, 2, 3)
+        return estimates, state[:, 6 : 6 + self._thrusters], state[:, 6 + self._thrusters :]
+
+    def _blocks(self, seen: Any, estimates: Array, thrust: Array, applied: Any) -> Array:
+        blocks = np.zeros((-(-len(seen) // WIDTH), self._plant.row.size * WIDTH))
+        place_all(seen, self._model, self._plant, estimates, thrust, applied, blocks)
+        return blocks
