@@ -10,6 +10,7 @@ from typing import Any
 
 from agents.terminal import figures, mm
 from baselines.leaderboard import MAIN, Document
+from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.validation import require
 
 MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
@@ -49,12 +50,16 @@ def table(rows: Mapping[str, Any]) -> str:
         cells += [mm(e["iqm"]) for e in errors] + [mm(e["worst"]) for e in errors]
         cells += [figures(each[key]["mean"]) for key in ("thrust_effort", "thrust_variation")]
         beats = each.get("beats_next")
-        decision = "" if beats is None else "yes" if beats["decided"] else "undecided"
-        probability = "" if beats is None else f" ({beats['probability']:.2f})"
-        lines.append(
-            "| " + " | ".join([*cells, str(each["failures"]), decision + probability]) + " |"
-        )
+        decision = "" if beats is None else f"{said(beats)} ({beats['probability']:.2f})"
+        lines.append("| " + " | ".join([*cells, str(each["failures"]), decision]) + " |")
     return "\n".join(lines) + "\n"
+
+
+def said(beats: Mapping[str, Any]) -> str:
+    """Whether the data decide, in a word or two."""
+    if beats["episodes"] < FEWEST_EPISODES:
+        return "too few"
+    return "yes" if beats["decided"] else "undecided"
 
 
 def markdown(found: Document) -> str:

@@ -135,6 +135,7 @@ def beaten(worse: Evaluation, better: Evaluation) -> dict[str, Any]:
     """Whether the data decide that a row is better than the next."""
     found = compare(total(worse), total(better))
     return {
+        "episodes": found.episodes,
         "probability": found.improvement,
         "ci95": list(found.improvement_ci95),
         "decided": found.decided,

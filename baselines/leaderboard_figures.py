@@ -42,7 +42,11 @@ def _errors(suites: Mapping[str, Any]) -> Any:
     names = list(suites[MAIN])
     height = 0.25 * len(names) + 1.2
     figure, panels = plt.subplots(
-        len(suites), 2, figsize=(9, height * len(suites)), squeeze=False, layout="constrained"
+        *(len(suites), 2),
+        figsize=(9, height * len(suites)),
+        squeeze=False,
+        sharex=True,
+        layout="constrained",
     )
     for line, (suite, rows) in zip(panels, suites.items(), strict=True):
         for panel, axis in zip(line, "xy", strict=True):

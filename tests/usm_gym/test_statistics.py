@@ -1,0 +1,81 @@
+"""Intervals, middle halves and verdicts are what they are called."""
+
+import numpy as np
+import pytest
+
+from usm_gym import statistics
+from usm_gym.statistics import compare, improvement, interquartile_mean, interval
+
+
+def test_an_interval_covers_the_truth_about_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(0)
+    limits = [interval(np.mean, rng.exponential(size=60)) for _ in range(100)]
+    assert 88 <= sum(low <= 1.0 <= high for low, high in limits) <= 99
+
+
+def test_strata_are_resampled_by_themselves() -> None:
+    # Two strata without spread: only a resampling across them could move the mean.
+    values, strata = np.repeat([1.0, 3.0], 25), ["calm"] * 25 + ["rough"] * 25
+    assert interval(np.mean, values, strata) == (2.0, 2.0)
+    low, high = interval(np.mean, values)
+    assert low < 2.0 < high
+
+
+def test_intervals_have_no_randomness() -> None:
+    values = np.random.default_rng(1).random(50)
+    assert interval(np.mean, values) == interval(np.mean, values)
+    assert interval(np.mean, [2.0]) == (2.0, 2.0)
+
+
+def test_the_interquartile_mean_is_that_of_the_middle_half() -> None:
+    assert interquartile_mean([1e9, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, -1e9]) == 2.5
+    assert interquartile_mean(np.arange(16.0).reshape(2, 8)).tolist() == [3.5, 11.5]
+
+
+def test_ties_are_half_an_improvement() -> None:
+    assert improvement([-1.0, -2.0, 0.0, 5.0]) == 0.625
+
+
+def test_pairs_decide_where_the_spread_between_episodes_hides_it() -> None:
+    rng = np.random.default_rng(2)
+    first = rng.lognormal(sigma=1.0, size=50)
+    second = first - 0.02 + 0.01 * rng.standard_normal(50)
+    found = compare(first, second)
+    assert found.decided
+    assert found.difference == pytest.approx(second.mean() - first.mean())
+    assert found.difference_ci95[0] < found.difference < found.difference_ci95[1] < 0
+    assert found.improvement == np.mean(second < first)
+    assert found.verdict("A", "B") == "the data decide: B is better than A"
+    assert compare(second, first).verdict("B", "A") == "the data decide: B is better than A"
+    # Not paired, the same numbers would decide nothing.
+    alone = [interval(np.mean, values) for values in (first, second)]
+    assert alone[0][0] < alone[1][1]
+
+
+def test_equal_policies_are_rarely_told_apart() -> None:
+    rng = np.random.default_rng(3)
+    decided = [compare(*rng.exponential(size=(2, 50))).decided for _ in range(100)]
+    assert sum(decided) <= 12
+    assert "do not decide" in compare(np.arange(60.0), np.arange(60.0)).verdict("A", "B")
+
+
+def test_no_conclusion_is_drawn_from_few_episodes() -> None:
+    found = compare(np.ones(49), np.zeros(49))
+    assert not found.decided
+    assert "no conclusion: 49 episodes" in found.verdict("A", "B")
+    assert compare(np.ones(50), np.zeros(50)).decided
+
+
+def test_unequal_numbers_of_episodes_are_refused() -> None:
+    with pytest.raises(ValueError, match="second"):
+        compare(np.ones(3), np.ones(4))
+
+
+def test_a_performance_profile_is_a_distribution_function() -> None:
+    values = np.random.default_rng(4).lognormal(size=50)
+    thresholds = np.sort(values)[[0, 24, 49]]
+    shares, (low, high) = statistics.performance_profile(values, thresholds)
+    assert shares == pytest.approx([0.02, 0.5, 1.0])
+    assert (low <= shares).all()
+    assert (shares <= high).all()
+    assert 0.1 < low[1] < 0.45 < 0.55 < high[1] < 0.9
