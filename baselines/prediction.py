@@ -204,6 +204,17 @@ def read_ahead(observation, model, time, blocks, ahead):
             ahead[b, axis] = error_ahead(observation[b], model, time, axis, block, lane)
 
 
+@piece
+def held_force(signals, model, b, axis):
+    """Force, N, that the last commands of a robot make in an axis, its links being as they are."""
+    seen, force = signals.observation[b], 0.0
+    limit = value(seen, model, THRUSTER_LIMIT, 0)
+    for j in range(model.thruster_links.size):
+        command = value(seen, model, THRUSTER_COMMAND, j) * limit
+        force += signals.allocation[b, axis, j] * command
+    return force
+
+
 class Predictor:
     """Estimates where the robots of a batch are, and foresees where they will be.
 
@@ -251,6 +262,10 @@ class Predictor:
             advance_all(blocks, self._plant.plant)
             read_ahead(seen, self._model, (i + 1) * self._model.h, blocks, ahead[i])
         return ahead
+
+    def thrust(self, state: Array) -> Array:
+        """Forces of the thrusters, N, (batch, thrusters)."""
+        return self._parts(state)[1]
 
     def _parts(self, state: Array) -> tuple[Array, Array, Array]:
         estimates = state[:, :6].reshape(-1, 2, 3)

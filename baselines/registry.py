@@ -14,8 +14,9 @@ from baselines.generalised_super_twisting import (
     GeneralisedSuperTwisting,
 )
 from baselines.ladrc import LADRC, LADRC_SPACE
-from baselines.lqg import LQG, LQG_SPACE
+from baselines.lqg import JOINT_LQG_SPACE, LQG, LQG_SPACE, JointLQG
 from baselines.mpc import MPC, MPC_SPACE
+from baselines.oracle import Oracle
 from baselines.pd import PD
 from baselines.pid import PID, PID_SPACE
 from baselines.policy import Policy
@@ -151,6 +152,12 @@ register(
     "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
     space=LQG_SPACE,
 )
+register(
+    "lqg-joints",
+    JointLQG,
+    "the same with the joint motion foreseen by the nominal plant",
+    space=JOINT_LQG_SPACE,
+)
 register("mpc", MPC, "predictive control on the nominal plant, joint motion known", space=MPC_SPACE)
 register(
     "smc",
@@ -170,4 +177,5 @@ register(
     "the same with the paper's adaptation of its gains",
     space=ADAPTIVE_SPACE,
 )
+register("oracle", Oracle, "the limit: true state, exact plant, the future", privileged=True)
 register("zero", Zero, "no thrust")
