@@ -20,7 +20,7 @@ from scipy.linalg import solve_discrete_are
 from baselines import kalman
 from baselines.kalman import COMMAND, DISTURBANCE, ERROR, RATE, STATES, THRUST
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
-from baselines.prediction import Predictor, held_force
+from baselines.prediction import ESTIMATES, Predictor, held_force
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
@@ -122,7 +122,7 @@ def lqg(signals, mass, model, gain, state, force):
 
 
 @compiled
-def joint_lqg(signals, model, linear, gain, estimates, thrust, ahead, force):
+def joint_lqg(signals, model, linear, gain, state, ahead, force):
     """Regulator for a batch, both axes, the disturbance being foreseen.
 
     It is the constant one that would take the linear model, its last command held, to where the
@@ -133,27 +133,24 @@ def joint_lqg(signals, model, linear, gain, estimates, thrust, ahead, force):
         model: Nominal knowledge for reading observations.
         linear: The linear model.
         gain: Gains of the regulator, (2, 4).
-        estimates: (e, v, d), (batch, 2, 3).
-        thrust: Forces of the thrusters, N, (batch, thrusters).
+        state: State of the predictor, (batch, size).
         ahead: (error, rate) after each period foreseen, (periods, batch, 2 axes, 2).
         force: Where to write, (batch, 2).
     """
-    own, unit = np.empty(STATES), np.empty(STATES)
+    own, held, unit = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     for b in range(force.shape[0]):
         for axis in range(2):
             inertia, transition = linear.inertia[axis], linear.transition[axis]
-            f, last = 0.0, held_force(signals, model, b, axis) / inertia
-            for j in range(thrust.shape[1]):
-                f += signals.allocation[b, axis, j] * thrust[b, j] / inertia
-            own[ERROR], own[RATE] = estimates[b, axis, 0], estimates[b, axis, 1]
-            own[DISTURBANCE], own[THRUST] = 0.0, f
-            unit[:] = 0.0
+            last, thrust = held_force(signals, model, b, axis) / inertia, 0.0
+            for j in range(model.thruster_links.size):
+                thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
+            own[ERROR], own[RATE] = state[b, 3 * axis], state[b, 3 * axis + 1]
+            own[DISTURBANCE], own[THRUST] = 0.0, thrust / inertia
+            held[:], unit[:] = own, 0.0
             for _ in range(ahead.shape[0]):
-                kalman.predict(transition, last, 0.0, own)
+                kalman.predict(transition, last, 0.0, held)
                 kalman.predict(transition, 0.0, 1.0, unit)
-            steady = -(ahead[-1, b, axis, 0] - own[ERROR]) / unit[ERROR]
-            own[ERROR], own[RATE] = estimates[b, axis, 0], estimates[b, axis, 1]
-            own[THRUST] = f
+            steady = -(ahead[-1, b, axis, 0] - held[ERROR]) / unit[ERROR]
             force[b, axis] = inertia * regulate(gain[axis], steady, last, own)
 
 
@@ -164,25 +161,22 @@ class LQG(ScriptedPolicy):
     """
 
     law_size = STATES
+    _Gains: type[Any] = LQGGains
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute filter and regulator; gains other than the defaults by name, see `LQGGains`."""
-        self._prepare(nominal, LQGGains(**gains))
+        super().__init__(nominal, self._Gains(**gains))
+        own = self.gains
+        require(own.variation_weight > 0, "variation_weight", own.variation_weight, "a number > 0")
+        self._linear = kalman.linear_model(nominal, own.acceleration_noise, own.disturbance_noise)
+        weights = own.variation_weight * self._linear.inertia
+        self._gain = np.stack(list(map(regulator_gain, self._linear.transition, weights)))
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """Estimate, then regulate."""
         force = np.empty_like(signals.y)
         lqg(signals, self._model.mass, self._linear, self._gain, law_state, force)
         return force
-
-    def _prepare(self, nominal: Nominal, gains: Any) -> None:
-        super().__init__(nominal, gains)
-        own = self.gains
-        self._linear = kalman.linear_model(nominal, own.acceleration_noise, own.disturbance_noise)
-        require(own.variation_weight > 0, "variation_weight", own.variation_weight, "a number > 0")
-        weights = own.variation_weight * self._linear.inertia
-        gain = map(regulator_gain, self._linear.transition, weights)
-        self._gain = np.stack(list(gain))
 
 
 class JointLQG(LQG):
@@ -191,9 +185,12 @@ class JointLQG(LQG):
     Filter and future are those of `prediction.Predictor`, whose state is the law's.
     """
 
+    _Gains = JointLQGGains
+
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute the gains; gains other than the defaults by name, see `JointLQGGains`."""
-        self._prepare(nominal, JointLQGGains(**gains))
+        super().__init__(nominal, **gains)
+        require(self.gains.lead > 0, "lead", self.gains.lead, "a number > 0")
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
         self._predictor = Predictor(nominal, self._model, self._linear.correction)
 
@@ -204,9 +201,8 @@ class JointLQG(LQG):
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """Estimate, foresee, regulate."""
-        predictor, force = self._predictor, np.empty_like(signals.y)
-        estimates = predictor.estimate(signals, law_state)
-        ahead = predictor.foresee(signals, law_state, self._periods)
-        thrust = predictor.thrust(law_state)
-        joint_lqg(signals, self._model, self._linear, self._gain, estimates, thrust, ahead, force)
+        self._predictor.estimate(signals, law_state)
+        ahead = self._predictor.foresee(signals, law_state, self._periods)
+        force = np.empty_like(signals.y)
+        joint_lqg(signals, self._model, self._linear, self._gain, law_state, ahead, force)
         return force
