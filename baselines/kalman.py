@@ -23,6 +23,7 @@ from scipy.linalg import expm, solve_discrete_are
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import piece
 from usm_gym.robot import Robot
+from usm_gym.validation import require
 
 Array = NDArray[np.float64]
 
@@ -106,7 +107,12 @@ def linear_model(nominal: Nominal, acceleration_noise: float, disturbance_noise:
         nominal: Nominal knowledge.
         acceleration_noise: Spectral density of what drives v, m/s^2 / sqrt(Hz).
         disturbance_noise: Spectral density of what drives d, m/s^3 / sqrt(Hz).
+
+    Raises:
+        ValueError: If a density is not above 0.
     """
+    require(acceleration_noise > 0, "acceleration_noise", acceleration_noise, "a number > 0")
+    require(disturbance_noise > 0, "disturbance_noise", disturbance_noise, "a number > 0")
     h, lag = nominal.control_period, nominal.thruster_time_constant
     inertia, drag = straight_body(nominal.robot)
     damping = drag / inertia

@@ -12,7 +12,7 @@ and 8; section 4.3 there for the price on the input's change.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -20,6 +20,7 @@ from scipy.linalg import solve_discrete_are
 from baselines import kalman
 from baselines.kalman import COMMAND, DISTURBANCE, ERROR, RATE, STATES, THRUST
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
+from baselines.prediction import ESTIMATES, Predictor, held_force
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
@@ -31,6 +32,8 @@ LQG_SPACE: Space = {
     "variation_weight": Range(1e-6, 1e-2, "m/N"),
     "heading_gain": HEADING_RANGE,
 }
+
+JOINT_LQG_SPACE: Space = {**LQG_SPACE, "lead": Range(0.02, 0.3, "s")}
 
 
 class LQGGains(NamedTuple):
@@ -47,6 +50,24 @@ class LQGGains(NamedTuple):
     acceleration_noise: float = 1e-2
     disturbance_noise: float = 0.3
     variation_weight: float = 1e-4
+    heading_gain: float = 100.0
+
+
+class JointLQGGains(NamedTuple):
+    """Gains of the LQG controller that knows the joint motion.
+
+    Attributes:
+        acceleration_noise: As in `LQGGains`.
+        disturbance_noise: As in `LQGGains`.
+        variation_weight: As in `LQGGains`.
+        lead: How far ahead the disturbance is foreseen, s.
+        heading_gain: k_psi, N m/rad.
+    """
+
+    acceleration_noise: float = 1e-2
+    disturbance_noise: float = 0.1
+    variation_weight: float = 5e-5
+    lead: float = 0.08
     heading_gain: float = 100.0
 
 
@@ -100,6 +121,39 @@ def lqg(signals, mass, model, gain, state, force):
             force[b, axis] = inertia * regulate(gain[axis], steady, last, own)
 
 
+@compiled
+def joint_lqg(signals, model, linear, gain, state, ahead, force):
+    """Regulator for a batch, both axes, the disturbance being foreseen.
+
+    It is the constant one that would take the linear model, its last command held, to where the
+    nominal plant is foreseen.
+
+    Args:
+        signals: What the law works with.
+        model: Nominal knowledge for reading observations.
+        linear: The linear model.
+        gain: Gains of the regulator, (2, 4).
+        state: State of the predictor, (batch, size).
+        ahead: (error, rate) after each period foreseen, (periods, batch, 2 axes, 2).
+        force: Where to write, (batch, 2).
+    """
+    own, held, unit = np.empty(STATES), np.empty(STATES), np.empty(STATES)
+    for b in range(force.shape[0]):
+        for axis in range(2):
+            inertia, transition = linear.inertia[axis], linear.transition[axis]
+            last, thrust = held_force(signals, model, b, axis) / inertia, 0.0
+            for j in range(model.thruster_links.size):
+                thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
+            own[ERROR], own[RATE] = state[b, 3 * axis], state[b, 3 * axis + 1]
+            own[DISTURBANCE], own[THRUST] = 0.0, thrust / inertia
+            held[:], unit[:] = own, 0.0
+            for _ in range(ahead.shape[0]):
+                kalman.predict(transition, last, 0.0, held)
+                kalman.predict(transition, 0.0, 1.0, unit)
+            steady = -(ahead[-1, b, axis, 0] - held[ERROR]) / unit[ERROR]
+            force[b, axis] = inertia * regulate(gain[axis], steady, last, own)
+
+
 class LQG(ScriptedPolicy):
     """Linear-quadratic Gaussian control with a disturbance estimate and the thrusters' lag.
 
@@ -107,25 +161,48 @@ class LQG(ScriptedPolicy):
     """
 
     law_size = STATES
+    _Gains: type[Any] = LQGGains
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute filter and regulator; gains other than the defaults by name, see `LQGGains`."""
-        super().__init__(nominal, LQGGains(**gains))
-        for name in ("acceleration_noise", "disturbance_noise", "variation_weight"):
-            require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
-        self._linear = kalman.linear_model(
-            nominal, self.gains.acceleration_noise, self.gains.disturbance_noise
-        )
-        weights = self.gains.variation_weight * self._linear.inertia
-        self._gain = np.stack(
-            [
-                regulator_gain(T, weight)
-                for T, weight in zip(self._linear.transition, weights, strict=True)
-            ]
-        )
+        super().__init__(nominal, self._Gains(**gains))
+        own = self.gains
+        require(own.variation_weight > 0, "variation_weight", own.variation_weight, "a number > 0")
+        self._linear = kalman.linear_model(nominal, own.acceleration_noise, own.disturbance_noise)
+        weights = own.variation_weight * self._linear.inertia
+        self._gain = np.stack(list(map(regulator_gain, self._linear.transition, weights)))
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """Estimate, then regulate."""
         force = np.empty_like(signals.y)
         lqg(signals, self._model.mass, self._linear, self._gain, law_state, force)
+        return force
+
+
+class JointLQG(LQG):
+    """LQG control to which the nominal plant foretells what the joint motion will do.
+
+    Filter and future are those of `prediction.Predictor`, whose state is the law's.
+    """
+
+    _Gains = JointLQGGains
+
+    def __init__(self, nominal: Nominal, **gains: float) -> None:
+        """Compute the gains; gains other than the defaults by name, see `JointLQGGains`."""
+        super().__init__(nominal, **gains)
+        require(self.gains.lead > 0, "lead", self.gains.lead, "a number > 0")
+        self._periods = max(1, round(self.gains.lead / nominal.control_period))
+        self._predictor = Predictor(nominal, self._model, self._linear.correction)
+
+    @property
+    def law_shape(self) -> tuple[int, ...]:
+        """The state of the predictor."""
+        return (self._predictor.size,)
+
+    def force(self, signals: Signals, law_state: Array) -> Array:
+        """Estimate, foresee, regulate."""
+        self._predictor.estimate(signals, law_state)
+        ahead = self._predictor.foresee(signals, law_state, self._periods)
+        force = np.empty_like(signals.y)
+        joint_lqg(signals, self._model, self._linear, self._gain, law_state, ahead, force)
         return force

@@ -19,12 +19,11 @@ import numpy as np
 
 from baselines import kalman
 from baselines.kalman import COMMAND, ERROR, RATE, THRUST
-from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals, value
-from baselines.prediction import Predictor
+from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
+from baselines.prediction import Predictor, held_force
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled
-from usm_gym.plant.measure import THRUSTER_COMMAND, THRUSTER_LIMIT
 from usm_gym.validation import require
 
 MPC_SPACE: Space = {
@@ -84,13 +83,8 @@ def receding_gain(transition: Array, periods: int, weight: float) -> Array:
 def receding(signals, model, inertia, gain, ahead, force):
     """Add the first change to the force of the held commands; fills in the force, (batch, 2)."""
     for b in range(force.shape[0]):
-        seen = signals.observation[b]
-        limit = value(seen, model, THRUSTER_LIMIT, 0)
         for axis in range(2):
-            total = 0.0
-            for j in range(model.thruster_links.size):
-                command = value(seen, model, THRUSTER_COMMAND, j) * limit
-                total += signals.allocation[b, axis, j] * command
+            total = held_force(signals, model, b, axis)
             for i in range(ahead.shape[0]):
                 total -= inertia[axis] * gain[axis, i] * ahead[i, b, axis, 0]
             force[b, axis] = total
@@ -105,7 +99,7 @@ class MPC(ScriptedPolicy):
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute the gains; gains other than the defaults by name, see `MPCGains`."""
         super().__init__(nominal, MPCGains(**gains))
-        for name in ("acceleration_noise", "disturbance_noise", "variation_weight", "horizon"):
+        for name in ("variation_weight", "horizon"):
             require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
         linear = kalman.linear_model(
             nominal, self.gains.acceleration_noise, self.gains.disturbance_noise

@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from baselines.observer import check_observer, compensating_force, observe, observer_gains
-from baselines.policy import Array, ScriptedPolicy, Signals
+from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
+from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.validation import require
@@ -15,6 +16,28 @@ from usm_gym.validation import require
 Reading = Literal["force", "mass", "observer"]
 READINGS: tuple[Reading, ...] = ("force", "mass", "observer")
 FORCE, MASS, OBSERVER = range(3)
+
+PD_SPACES: dict[Reading, Space] = {
+    "force": {
+        "k_p": Range(30.0, 30000.0, "N/m"),
+        "k_d": Range(10.0, 3000.0, "N s/m"),
+        "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
+        "heading_gain": HEADING_RANGE,
+    },
+    "mass": {
+        "k_p": Range(3.0, 3000.0, "1/s^2"),
+        "k_d": Range(1.0, 300.0, "1/s"),
+        "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
+        "heading_gain": HEADING_RANGE,
+    },
+    "observer": {
+        "k_p": Range(0.3, 300.0, "1/s^2"),
+        "k_d": Range(0.1, 30.0, "1/s"),
+        "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
+        "surface": Range(0.1, 30.0, "1/s"),
+        "heading_gain": HEADING_RANGE,
+    },
+}
 
 
 class PDGains(NamedTuple):

@@ -204,6 +204,14 @@ class ScriptedPolicy:
         """Shape of the law's state for one robot; by default `law_size` numbers for each axis."""
         return (2, self.law_size)
 
+    def law_state(self, state: Array) -> Array:
+        """The law's own part of what `predict` returns, (batch, *law_shape), as a copy.
+
+        What its numbers are, the law says in its docstring.
+        """
+        own = state[:, 1 + 2 * self._thrusters :]
+        return own.reshape(len(state), *self.law_shape).copy()
+
     def force(self, signals: Signals, law_state: Array) -> Array:
         """The force on the centre of mass, N, (batch, 2); the law's state is advanced in place.
 
@@ -255,9 +263,8 @@ class ScriptedPolicy:
         allocation = np.empty((size, 3, thrusters))
         signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
         sense(state, self._model, signals)
-        law_state = state[:, 1 + 2 * thrusters :].reshape(size, *self.law_shape)
+        law_state = self.law_state(state)
         force = self.force(signals, law_state)
-        # Where the reshape had to copy, the advanced state has to be written back.
         state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)
         action = np.empty((size, thrusters), np.float32)
         gain = float(self.gains.heading_gain)

@@ -9,7 +9,7 @@ present value, rate and acceleration. Water at rest; its current ends up in d.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,8 @@ from usm_gym.plant.measure import (
 from usm_gym.plant.motion import filter_coefficients, lag_share
 from usm_gym.plant.step import Plant, advance
 
+# Numbers at the start of a predictor's state: (e, v, d) of x and of y.
+ESTIMATES = 6
 # Physics steps of a prediction in a control period.
 SUBSTEPS = 5
 # The frequency that is assumed of the joint references' filter, rad/s.
@@ -112,15 +114,14 @@ def place_references(seen, model, frequency, block, lane):
 
 
 @piece
-def place(seen, model, nominal, estimate, thrust, applied, block, lane):
+def place(seen, model, nominal, state, applied, block, lane):
     """Put a robot where an observation and the estimates say it is.
 
     Args:
         seen: Observation.
         model: Nominal knowledge for reading it.
         nominal: The nominal robot.
-        estimate: (e, v, d) of each axis, (2, 3).
-        thrust: Forces of the thrusters, N.
+        state: State of the predictor, of the time of the observation.
         applied: The observation that tells the commands over the coming period.
         block: Block of the robot, (rows * WIDTH,).
         lane: Its place in the block.
@@ -137,18 +138,19 @@ def place(seen, model, nominal, estimate, thrust, applied, block, lane):
         block[(row_of(THETA, links) + i) * WIDTH + lane] = theta
         block[(row_of(OMEGA, links) + i) * WIDTH + lane] = omega
     for axis in range(2):
-        block[(P_X + axis) * WIDTH + lane] = estimate[axis, 0]
-        velocity = estimate[axis, 1] + value(seen, model, REFERENCE_VELOCITY, axis)
+        e, v, d = state[3 * axis], state[3 * axis + 1], state[3 * axis + 2]
+        block[(P_X + axis) * WIDTH + lane] = e
+        velocity = v + value(seen, model, REFERENCE_VELOCITY, axis)
         block[(V_X + axis) * WIDTH + lane] = velocity
         # All water accelerating by d accelerates the centre of mass by d and turns nothing.
-        block[(WATER_AX + axis) * WIDTH + lane] = estimate[axis, 2]
+        block[(WATER_AX + axis) * WIDTH + lane] = d
     place_references(seen, model, nominal.frequency, block, lane)
     limit = value(applied, model, THRUSTER_LIMIT, 0)
     first = first_command(links)
     for j in range(thrusters):
         command = value(applied, model, THRUSTER_COMMAND, j) * limit
         block[(first + j) * WIDTH + lane] = command
-        block[(first + thrusters + j) * WIDTH + lane] = thrust[j]
+        block[(first + thrusters + j) * WIDTH + lane] = state[ESTIMATES + j]
 
 
 @compiled
@@ -170,32 +172,47 @@ def error_ahead(seen, model, time, axis, block, lane):
 
 
 @compiled
-def place_all(observation, model, nominal, estimates, thrust, applied, blocks):
-    """`place` every robot of a batch, lane by lane; lanes that are left over stay idle."""
+def place_all(observation, model, nominal, state, past, blocks):
+    """`place` every robot of a batch, lane by lane; lanes that are left over stay idle.
+
+    Args:
+        observation: Observations now, (batch, numbers).
+        model: Nominal knowledge for reading them.
+        nominal: The nominal robot.
+        state: State of the predictor, (batch, size).
+        past: Whether to place them as they were a period ago, with the commands known by now.
+        blocks: Where to write, (blocks, rows * WIDTH).
+    """
+    last = ESTIMATES + model.thruster_links.size
     for b in range(observation.shape[0]):
-        block, lane = blocks[b // WIDTH], b % WIDTH
-        place(observation[b], model, nominal, estimates[b], thrust[b], applied[b], block, lane)
+        seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
+        if past:
+            place(own[last:], model, nominal, own, seen, block, lane)
+        else:
+            place(seen, model, nominal, own, seen, block, lane)
 
 
 @compiled
-def update(observation, before, started, model, correction, blocks, estimates, thrust):
-    """Read the predicted estimates of a batch off its blocks and correct them."""
+def update(observation, started, model, correction, blocks, state):
+    """Bring the state of a batch to the present, from its blocks and the measured position."""
     thrusters = model.thruster_links.size
     for b in range(observation.shape[0]):
-        seen, block, lane = observation[b], blocks[b // WIDTH], b % WIDTH
+        seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
+        before = own[ESTIMATES + thrusters :]
         for axis in range(2):
-            y = value(seen, model, POSITION_ERROR, axis)
-            own = estimates[b, axis]
+            y, estimate = value(seen, model, POSITION_ERROR, axis), own[3 * axis : 3 * axis + 3]
             if started[b] == 0.0:
-                own[0], own[1], own[2] = y, -value(seen, model, REFERENCE_VELOCITY, axis), 0.0
+                rate = -value(seen, model, REFERENCE_VELOCITY, axis)
+                estimate[0], estimate[1], estimate[2] = y, rate, 0.0
             else:
-                own[0], own[1] = error_ahead(before[b], model, model.h, axis, block, lane)
-                innovation = y - own[0]
-                for i in range(3):
-                    own[i] += correction[axis, i] * innovation
+                e, v = error_ahead(before, model, model.h, axis, block, lane)
+                estimate[0] = e + correction[axis, 0] * (y - e)
+                estimate[1] = v + correction[axis, 1] * (y - e)
+                estimate[2] += correction[axis, 2] * (y - e)
         for j in range(thrusters):
             row = first_command(model.links) + thrusters + j
-            thrust[b, j] = block[row * WIDTH + lane] if started[b] > 0.0 else 0.0
+            own[ESTIMATES + j] = block[row * WIDTH + lane] if started[b] > 0.0 else 0.0
+        before[:] = seen
 
 
 @compiled
@@ -207,10 +224,21 @@ def read_ahead(observation, model, time, blocks, ahead):
             ahead[b, axis] = error_ahead(observation[b], model, time, axis, block, lane)
 
 
+@piece
+def held_force(signals, model, b, axis):
+    """Force, N, that the last commands of a robot make in an axis, its links being as they are."""
+    seen, force = signals.observation[b], 0.0
+    limit = value(seen, model, THRUSTER_LIMIT, 0)
+    for j in range(model.thruster_links.size):
+        command = value(seen, model, THRUSTER_COMMAND, j) * limit
+        force += signals.allocation[b, axis, j] * command
+    return force
+
+
 class Predictor:
     """Estimates where the robots of a batch are, and foresees where they will be.
 
-    Its state is an array of numbers for each robot: (e, v, d) of either axis, the forces of the
+    Its state is an array of numbers for each robot: (e, v, d) of x and of y, the forces of the
     thrusters in N, the last observation.
 
     Attributes:
@@ -225,41 +253,32 @@ class Predictor:
             model: The same for kernels.
             correction: Gains of the filter on (e, v, d), (2, 3).
         """
-        self._plant, self._model, self._correction = nominal_plant(nominal), model, correction
-        self._thrusters = len(nominal.robot.thrusters)
-        self.size = 6 + self._thrusters + model.scale.size
+        self._nominal, self._model, self._correction = nominal_plant(nominal), model, correction
+        self.size = ESTIMATES + len(nominal.robot.thrusters) + model.scale.size
 
-    def estimate(self, signals: Signals, state: Array) -> Array:
-        """Bring the state to the present and return the estimates (e, v, d), (batch, 2, 3)."""
-        model, seen = self._model, signals.observation
-        estimates, thrust, before = self._parts(state)
-        blocks = self._blocks(before, estimates, thrust, seen)
-        advance_all(blocks, self._plant.plant)
-        update(seen, before, signals.started, model, self._correction, blocks, estimates, thrust)
-        state[:, :6] = estimates.reshape(-1, 6)
-        before[:] = seen
-        return estimates
+    def estimate(self, signals: Signals, state: Array) -> None:
+        """Bring the state, (batch, size), to the present, in place."""
+        blocks = self._blocks(signals, state, past=True)
+        advance_all(blocks, self._nominal.plant)
+        seen, started = signals.observation, signals.started
+        update(seen, started, self._model, self._correction, blocks, state)
 
     def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
-        """Where an estimated robot goes if its last commands are held.
+        """Where estimated robots go if their last commands are held.
 
         Returns:
             Error and its rate after each period, m and m/s, (periods, batch, 2 axes, 2).
         """
         seen = signals.observation
-        estimates, thrust, _ = self._parts(state)
-        blocks = self._blocks(seen, estimates, thrust, seen)
+        blocks = self._blocks(signals, state, past=False)
         ahead = np.empty((periods, len(seen), 2, 2))
         for i in range(periods):
-            advance_all(blocks, self._plant.plant)
+            advance_all(blocks, self._nominal.plant)
             read_ahead(seen, self._model, (i + 1) * self._model.h, blocks, ahead[i])
         return ahead
 
-    def _parts(self, state: Array) -> tuple[Array, Array, Array]:
-        estimates = state[:, :6].reshape(-1, 2, 3)
-        return estimates, state[:, 6 : 6 + self._thrusters], state[:, 6 + self._thrusters :]
-
-    def _blocks(self, seen: Any, estimates: Array, thrust: Array, applied: Any) -> Array:
-        blocks = np.zeros((-(-len(seen) // WIDTH), self._plant.row.size * WIDTH))
-        place_all(seen, self._model, self._plant, estimates, thrust, applied, blocks)
+    def _blocks(self, signals: Signals, state: Array, past: bool) -> Array:
+        seen = signals.observation
+        blocks = np.zeros((-(-len(seen) // WIDTH), self._nominal.row.size * WIDTH))
+        place_all(seen, self._model, self._nominal, state, past, blocks)
         return blocks

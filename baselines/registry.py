@@ -15,14 +15,15 @@ from baselines.generalised_super_twisting import (
     GeneralisedSuperTwisting,
 )
 from baselines.ladrc import LADRC, LADRC_SPACE
-from baselines.lqg import LQG, LQG_SPACE
+from baselines.lqg import JOINT_LQG_SPACE, LQG, LQG_SPACE, JointLQG
 from baselines.mpc import MPC, MPC_SPACE
-from baselines.pd import PD
+from baselines.oracle import Oracle
+from baselines.pd import PD, PD_SPACES
 from baselines.pid import PID, PID_SPACE
 from baselines.policy import Policy
 from baselines.sliding_mode import SLIDING_MODE_SPACE, SlidingMode
 from baselines.space import Space
-from baselines.super_twisting import SuperTwisting
+from baselines.super_twisting import SUPER_TWISTING_SPACE, SuperTwisting
 from baselines.zero import Zero
 from usm_gym.nominal import Nominal
 from usm_gym.validation import require
@@ -144,18 +145,29 @@ def nominal_knowledge(env: Any) -> Nominal:
     return known
 
 
-register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
+register(
+    "sta",
+    SuperTwisting,
+    "adaptive super-twisting (10)-(20), the paper's gains, implicit",
+    space=SUPER_TWISTING_SPACE,
+)
 register(
     "sta-explicit",
     partial(SuperTwisting, implicit=False),
     "the same by Euler's forward method, as the paper has it",
 )
-register("pd", PD, "PD (21) as a force, the paper's gains")
-register("pd-mass", partial(PD, reading="mass"), "PD (21) times the mass, with feedforward")
+register("pd", PD, "PD (21) as a force, the paper's gains", space=PD_SPACES["force"])
+register(
+    "pd-mass",
+    partial(PD, reading="mass"),
+    "PD (21) times the mass, with feedforward",
+    space=PD_SPACES["mass"],
+)
 register(
     "pd-observer",
     partial(PD, reading="observer"),
     "PD (21) in the place of u_STA in (19), the paper's words to the letter",
+    space=PD_SPACES["observer"],
 )
 register("pid", PID, "PID, filtered derivative, anti-windup", space=PID_SPACE)
 register(
@@ -169,6 +181,12 @@ register(
     LQG,
     "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
     space=LQG_SPACE,
+)
+register(
+    "lqg-joints",
+    JointLQG,
+    "the same with the joint motion foreseen by the nominal plant",
+    space=JOINT_LQG_SPACE,
 )
 register("mpc", MPC, "predictive control on the nominal plant, joint motion known", space=MPC_SPACE)
 register(
@@ -189,4 +207,5 @@ register(
     "the same with the paper's adaptation of its gains",
     space=ADAPTIVE_SPACE,
 )
+register("oracle", Oracle, "the limit: true state, exact plant, the future", privileged=True)
 register("zero", Zero, "no thrust")

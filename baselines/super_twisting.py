@@ -8,9 +8,20 @@ import numpy as np
 
 from baselines.observer import check_observer, compensating_force, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
+from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.validation import require
+
+SUPER_TWISTING_SPACE: Space = {
+    "observer_gain": Range(1e-2, 100.0, "m/s^3"),
+    "surface": Range(0.3, 30.0, "1/s"),
+    "epsilon": Range(1e-3, 1.0, "(m/s)^(1/2)/s"),
+    "beta_offset": Range(1e-4, 10.0, "m/s^2"),
+    "omega": Range(1e-3, 10.0, "(m/s)^(1/2)/s^2"),
+    "dead_zone": Range(1e-4, 0.1, "m/s"),
+    "alpha_start": Range(1e-2, 10.0, "(m/s)^(1/2)/s"),
+}
 
 
 class SuperTwistingGains(NamedTuple):

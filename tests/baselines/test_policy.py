@@ -20,7 +20,10 @@ from usm_gym.observation import ObservationLayout
 
 Array = NDArray[np.float64]
 
-SCRIPTED = ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero")
+SCRIPTED = (
+    *("sta", "sta-explicit", "pd", "pd-mass", "pd-observer"),
+    *("pid", "ladrc", "lqg", "lqg-joints", "mpc", "smc", "gsta", "agsta", "zero"),
+)
 LAYOUT = ObservationLayout(16, 5)
 
 
@@ -156,6 +159,13 @@ class Probe(ScriptedPolicy):
         self.seen = signals
         law_state += 1.0
         return np.tile([3.0, -2.0], (len(signals.y), 1))
+
+
+def test_the_law_state_is_what_the_law_left() -> None:
+    policy, seen = probe(), observations(2, 3)
+    _, state = policy.predict(seen[0])
+    _, state = policy.predict(seen[1], state)
+    assert np.array_equal(policy.law_state(state), np.full((3, 2, 1), 2.0))
 
 
 def probe() -> Probe:

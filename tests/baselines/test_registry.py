@@ -15,6 +15,7 @@ from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.scenario import PRESETS, named, sample
 
 SCRIPTED = ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero")
+RIVALS = ("pid", "ladrc", "lqg", "lqg-joints", "mpc", "smc", "gsta", "agsta")
 
 
 @pytest.fixture(autouse=True)
@@ -34,11 +35,27 @@ class Probe:
 
 
 def test_the_scripted_policies_are_there() -> None:
-    assert set(SCRIPTED) <= set(baselines.ids())
+    assert {*SCRIPTED, *RIVALS} <= set(baselines.ids())
     assert len(set(baselines.ids())) == len(baselines.ids())
-    for id in SCRIPTED:
-        assert not registry.entry(id).privileged
+    for id in baselines.ids():
+        assert registry.entry(id).privileged == (id == "oracle")
         assert "\n" not in registry.entry(id).summary
+
+
+@pytest.mark.parametrize("id", [*SCRIPTED, *RIVALS])
+def test_the_gains_of_a_space_are_gains_and_their_ranges_work(id: str) -> None:
+    nominal = gym.make("USM-Operation-v0").unwrapped.nominal
+    space = registry.entry(id).space
+    assert len(space) <= 7
+    assert bool(space) == (id not in ("sta-explicit", "zero"))
+    for end in ("low", "high"):
+        gains = {name: getattr(each, end) for name, each in space.items()}
+        policy: Any = baselines.make(id, nominal, **gains)
+        assert all(getattr(policy.gains, name) == gain for name, gain in gains.items())
+    if id not in ("sta", "pd", "pd-mass", "pd-observer"):  # the paper's gains may lie elsewhere
+        default: Any = baselines.make(id, nominal)
+        for name, each in space.items():
+            assert each.low <= getattr(default.gains, name) <= each.high
 
 
 def test_an_unknown_name_is_answered_with_those_there_are() -> None:
@@ -107,7 +124,7 @@ def test_environments_may_be_wrapped_vectorised_or_left_out() -> None:
             baselines.make("sta", wrong)
 
 
-@pytest.mark.parametrize("id", SCRIPTED)
+@pytest.mark.parametrize("id", [*SCRIPTED, *RIVALS])
 def test_unknown_and_impossible_gains_are_named(id: str) -> None:
     nominal = gym.make("USM-Operation-v0").unwrapped.nominal
     with pytest.raises(ValueError, match="k_q"):
