@@ -139,7 +139,6 @@ def tasks(
     Raises:
         ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
     """
-    require(time_limit > 0, "--time-limit", time_limit, "a number > 0")
     robot = Robot()
     nominal = shared_nominal(robot, scenarios)
     found = []

@@ -65,6 +65,10 @@ class Task:
     robot: Robot = dataclasses.field(default_factory=Robot)
     time_limit: float = TIME_LIMIT
 
+    def __post_init__(self) -> None:
+        """Refuse a time limit that leaves no time."""
+        require(self.time_limit > 0, "time_limit", self.time_limit, "a number > 0")
+
     @property
     def key(self) -> str | None:
         """A hash of all that the scores depend on; None where that is not known."""

@@ -214,7 +214,7 @@ def test_compare_draws_no_conclusion_from_few_episodes(
         (["robustness", "--vary", "noise", "--values", "much"], "--values"),
         (["robustness", "--vary", "model", "--values", "2"], "model is 2.0"),
         (["leaderboard", "--insert", "suite.json", "--policies", "zero"], "marks of the table"),
-        (["leaderboard", "--time-limit", "0"], "--time-limit"),
+        (["leaderboard", "--time-limit", "0"], "time_limit is 0.0"),
         (["tune", "zero"], "zero"),
         (["tune", "sta", "--output", "missing/sta.json"], "missing"),
         (["evaluate", "--cluster", "nowhere:1"], "nowhere:1"),
