@@ -6,6 +6,7 @@ import argparse
 import json
 import logging
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -16,6 +17,9 @@ import joblib
 
 from usm_gym.scenario import Conditions, conditions_of
 from usm_gym.validation import require
+
+# How long a cluster may take to accept a connection, s.
+CONNECTION_TIME = 10.0
 
 
 def add_computing(parser: argparse.ArgumentParser) -> None:
@@ -42,9 +46,10 @@ def computing(arguments: argparse.Namespace) -> Iterator[int]:
     import ray
     from ray.util.joblib import register_ray
 
+    check_reachable(arguments.cluster)
     try:
         ray.init(address=arguments.cluster, logging_level=logging.ERROR, log_to_driver=False)
-    except (ConnectionError, RuntimeError) as error:
+    except RuntimeError as error:
         raise ConnectionError(f"no Ray cluster at {arguments.cluster}: {error}") from error
     try:
         register_ray()
@@ -52,6 +57,18 @@ def computing(arguments: argparse.Namespace) -> Iterator[int]:
             yield workers or int(ray.cluster_resources().get("CPU", 1))
     finally:
         ray.shutdown()
+
+
+def check_reachable(address: str) -> None:
+    """Raise `ConnectionError` now where nobody listens, for whom Ray would wait for minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon:
+        return  # a word that Ray knows, such as "auto"
+    require(port.isdigit(), "--cluster", address, "HOST:PORT")
+    try:
+        socket.create_connection((host, int(port)), CONNECTION_TIME).close()
+    except OSError as error:
+        raise ConnectionError(f"no Ray cluster at {address}: {error}") from error
 
 
 def parse_conditions(text: str) -> Conditions:

@@ -60,7 +60,8 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=TIME_LIMIT,
         metavar="S",
-        help="how long a policy may think in a batch of up to 32 episodes, s (default: 120)",
+        help="how long a controller of your own may think in a batch of up to 32 episodes, s "
+        "(default: 120)",
     )
 
 
@@ -139,7 +140,6 @@ def tasks(
     Raises:
         ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
     """
-    require(time_limit > 0, "--time-limit", time_limit, "a number > 0")
     robot = Robot()
     nominal = shared_nominal(robot, scenarios)
     found = []

@@ -20,7 +20,7 @@ from optuna import Study
 from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.trial import TrialState
 
-from baselines.contender import Contender, registered
+from baselines.contender import registered
 from baselines.gains import Budget, GainsFile
 from baselines.registry import entry, tuned
 from baselines.scoring import Refusal, Task, score_all, score_batch, shared_nominal
@@ -98,7 +98,7 @@ class Problem:
         """The policy with some gains on these scenarios."""
         file = GainsFile(self.policy, gains, self.budget, self.weight)
         scenarios, robot = self.scenarios(purpose), Robot()
-        contender = Contender(self.policy, tuned(file).factory)
+        contender = registered(self.policy, tuned(file))
         return Task(contender, scenarios, shared_nominal(robot, scenarios), robot)
 
 

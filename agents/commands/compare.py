@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace) -> None:
     comparisons = {name: compare(first[name], second[name]) for name in SCORES}
     console = output_console()
     for name, comparison in comparisons.items():
-        console.print(sentence(name[-1], comparison, *names), markup=False, highlight=False)
+        console.print(sentence(name[-1], comparison, *names), markup=False, soft_wrap=True)
     if arguments.output:
         document = {
             "first": names[0],

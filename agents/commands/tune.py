@@ -64,6 +64,8 @@ def run(arguments: argparse.Namespace) -> None:
     )
     from baselines.tuning import VARIATION_WEIGHT, Problem, tune
 
+    output = Path(arguments.output or f"{arguments.policy}.json")
+    check_writable(output)
     conditions = arguments.conditions
     problem = Problem(
         policy=arguments.policy,
@@ -73,8 +75,6 @@ def run(arguments: argparse.Namespace) -> None:
         conditions=FIELD if conditions is None else parse_conditions(conditions),
         seed=count(arguments, "seed", 0, least=0),
     )
-    output = Path(arguments.output or f"{problem.policy}.json")
-    check_writable(output)
     storage = arguments.storage or f"sqlite:///{output.with_suffix('.db').absolute()}"
     with computing(arguments) as workers, progress_bar() as bar:
         line = bar.add_task(problem.policy, total=problem.budget.trials)
