@@ -43,13 +43,13 @@ _SHARED: Space = {
 }
 GENERALISED_SPACE: Space = {
     **_SHARED,
-    "k_1": Range(1e-2, 10.0, "(m/s)^(1/2)/s"),
+    "k_1": Range(1e-3, 10.0, "(m/s)^(1/2)/s"),
     "k_2": Range(1e-4, 10.0, "m/s^2"),
 }
 ADAPTIVE_SPACE: Space = {
     **_SHARED,
     "epsilon": Range(1e-3, 1.0, "(m/s)^(1/2)/s"),
-    "omega": Range(1e-2, 10.0, "(m/s)^(1/2)/s^2"),
+    "omega": Range(1e-3, 10.0, "(m/s)^(1/2)/s^2"),
     "dead_zone": Range(1e-4, 0.1, "m/s"),
 }
 
@@ -66,11 +66,11 @@ class GeneralisedGains(NamedTuple):
         heading_gain: k_psi, N m/rad.
     """
 
-    observer_gain: float = 0.5
-    surface: float = 3.0
-    linear: float = 5.0
-    k_1: float = 0.3
-    k_2: float = 0.05
+    observer_gain: float = 25.0
+    surface: float = 0.6
+    linear: float = 50.0
+    k_1: float = 0.02
+    k_2: float = 0.015
     heading_gain: float = 100.0
 
 
@@ -90,15 +90,15 @@ class AdaptiveGains(NamedTuple):
         heading_gain: k_psi, N m/rad.
     """
 
-    observer_gain: float = 0.5
-    surface: float = 3.0
-    linear: float = 5.0
-    epsilon: float = 0.05
-    beta_offset: float = 0.01
+    observer_gain: float = 25.0
+    surface: float = 0.6
+    linear: float = 50.0
+    epsilon: float = 0.01
+    beta_offset: float = 0.015
     gamma: float = 1.0
-    omega: float = 0.3
-    dead_zone: float = 0.01
-    alpha_start: float = 0.1
+    omega: float = 0.01
+    dead_zone: float = 0.03
+    alpha_start: float = 0.02
     heading_gain: float = 100.0
 
 

@@ -21,7 +21,7 @@ from usm_gym.plant.elementary import exp_of_negative
 from usm_gym.validation import require
 
 LADRC_SPACE: Space = {
-    "observer_bandwidth": Range(2.0, 100.0, "rad/s"),
+    "observer_bandwidth": Range(2.0, 200.0, "rad/s"),
     "controller_bandwidth": Range(0.5, 30.0, "rad/s"),
     "inertia": Range(5.0, 100.0, "kg"),
     "heading_gain": HEADING_RANGE,
@@ -38,9 +38,9 @@ class LADRCGains(NamedTuple):
         heading_gain: k_psi, N m/rad.
     """
 
-    observer_bandwidth: float = 20.0
-    controller_bandwidth: float = 5.0
-    inertia: float = 15.0
+    observer_bandwidth: float = 60.0
+    controller_bandwidth: float = 4.0
+    inertia: float = 17.0
     heading_gain: float = 100.0
 
 

@@ -33,7 +33,12 @@ LQG_SPACE: Space = {
     "heading_gain": HEADING_RANGE,
 }
 
-JOINT_LQG_SPACE: Space = {**LQG_SPACE, "lead": Range(0.02, 0.3, "s")}
+JOINT_LQG_SPACE: Space = {
+    **LQG_SPACE,
+    # The nominal plant leaves less to the disturbance.
+    "disturbance_noise": Range(1e-3, 1.0, "m/s^3 / sqrt(Hz)"),
+    "lead": Range(0.02, 0.3, "s"),
+}
 
 
 class LQGGains(NamedTuple):
@@ -48,8 +53,8 @@ class LQGGains(NamedTuple):
     """
 
     acceleration_noise: float = 1e-2
-    disturbance_noise: float = 0.3
-    variation_weight: float = 1e-4
+    disturbance_noise: float = 0.5
+    variation_weight: float = 5e-5
     heading_gain: float = 100.0
 
 
@@ -65,7 +70,7 @@ class JointLQGGains(NamedTuple):
     """
 
     acceleration_noise: float = 1e-2
-    disturbance_noise: float = 0.1
+    disturbance_noise: float = 0.05
     variation_weight: float = 5e-5
     lead: float = 0.08
     heading_gain: float = 100.0

@@ -28,7 +28,7 @@ from usm_gym.validation import require
 
 MPC_SPACE: Space = {
     "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),
-    "disturbance_noise": Range(1e-2, 10.0, "m/s^3 / sqrt(Hz)"),
+    "disturbance_noise": Range(1e-3, 1.0, "m/s^3 / sqrt(Hz)"),
     "variation_weight": Range(1e-6, 1e-3, "m/N"),
     "heading_gain": HEADING_RANGE,
 }
@@ -47,7 +47,7 @@ class MPCGains(NamedTuple):
     """
 
     acceleration_noise: float = 1e-2
-    disturbance_noise: float = 0.1
+    disturbance_noise: float = 0.05
     variation_weight: float = 5e-5
     horizon: float = 0.2
     heading_gain: float = 100.0

@@ -40,10 +40,10 @@ class PIDGains(NamedTuple):
         heading_gain: k_psi, N m/rad.
     """
 
-    k_p: float = 1000.0
-    k_i: float = 1500.0
-    k_d: float = 200.0
-    derivative_time: float = 0.03
+    k_p: float = 1300.0
+    k_i: float = 10000.0
+    k_d: float = 400.0
+    derivative_time: float = 0.003
     heading_gain: float = 100.0
 
 

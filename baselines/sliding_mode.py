@@ -23,7 +23,7 @@ from usm_gym.plant.compile import compiled, piece
 from usm_gym.validation import require
 
 SLIDING_MODE_SPACE: Space = {
-    "observer_gain": Range(1e-2, 100.0, "m/s^3"),
+    "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
     "surface": Range(0.3, 30.0, "1/s"),
     "eta": Range(1e-2, 10.0, "m/s^2"),
     "boundary": Range(1e-4, 1.0, "m/s"),
@@ -44,10 +44,10 @@ class SlidingModeGains(NamedTuple):
         heading_gain: k_psi, N m/rad.
     """
 
-    observer_gain: float = 1.0
-    surface: float = 3.0
-    eta: float = 1.0
-    boundary: float = 0.2
+    observer_gain: float = 90.0
+    surface: float = 14.0
+    eta: float = 0.8
+    boundary: float = 0.7
     heading_gain: float = 100.0
 
 
