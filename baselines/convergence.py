@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from baselines.observer import observe, observer_gains
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
 from usm_gym.plant.compile import compiled
+from usm_gym.plant.elementary import cube_root
 
 Array = NDArray[np.float64]
 
@@ -90,11 +91,11 @@ def run_cascade(gains, start, rate, switch, h, states):
     state = np.zeros(6)
     state[0] = start.error - start.e1
     state[1] = start.sigma - gains.surface * state[0]
-    state[3] = start.e1
+    state[3] = cube_root(abs(start.e1)) * np.sign(start.e1)
     state[5] = gains.alpha_start
     p, v, F, u = start.error, state[1] + start.e2, start.e3, 0.0
     for i in range(states.shape[1]):
-        e1, e2, e3 = state[3], v - state[1], F - state[2]
+        e1, e2, e3 = p - state[0], v - state[1], F - state[2]
         states[0, i], states[1, i] = p, gains.surface * state[0] + state[1]
         states[2, i] = state[5]
         states[3, i], states[4, i], states[5, i] = e1, e2, e3

@@ -22,6 +22,8 @@ from usm_gym.scenario import MODES, Mode, Scenario, named
 
 STEP = 1e-5
 IMPLICIT_STEP = 5e-4
+# The largest thruster limit that conditions may have, N; no run of the table comes near it.
+UNLIMITED = 1000.0
 # Records are kept, and errors looked at, every so often, s.
 SAMPLE_TIME = 1e-3
 HEADING_GAIN = 125.0
@@ -61,8 +63,10 @@ class Case:
 
 
 def at_step(scenario: Scenario, step: float) -> Scenario:
-    """A scenario with one control action in every physics step of `step` s."""
-    conditions = replace(scenario.conditions, control_period=step, physics_step=step)
+    """A scenario with one control action in every physics step of `step` s, thrusters unlimited."""
+    conditions = replace(
+        scenario.conditions, control_period=step, physics_step=step, thruster_limit=UNLIMITED
+    )
     return replace(scenario, conditions=conditions)
 
 
