@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.observer import observe, observer_gains
+from baselines.paper_rate import Record
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
 from usm_gym.plant.compile import compiled
 from usm_gym.plant.elementary import cube_root
@@ -151,3 +152,9 @@ def largest_rate(exponent: float) -> float:
         else:
             high = middle
     return low
+
+
+def disturbance_rate(record: Record) -> Array:
+    """|F'| in the worse axis between the samples of a run, m/s^3, (samples - 1,)."""
+    steps = np.abs(np.diff(record.disturbance, axis=0)).max(axis=1)
+    return np.asarray(steps / np.diff(record.time))

@@ -216,9 +216,9 @@ def study(
     ordered = sorted(todo, key=lambda each: -cost(todo[each]))
     for name, result in side_by_side(outcome, {name: todo[name] for name in ordered}, workers):
         known[name] = result
+        write_study(path, entries, known, origin)
         done += cost(todo[name])
         progress(done, total)
-        write_study(path, entries, known, origin)
     write_study(path, entries, known, origin)
     return [entry | {"result": known[key(entry)]} for entry in entries]
 

@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 
-from baselines.convergence import STEP, Start, cascade, growth, largest_rate, size
+from baselines.convergence import (
+    STEP,
+    Start,
+    cascade,
+    disturbance_rate,
+    growth,
+    largest_rate,
+    size,
+)
+from baselines.paper_rate import Law, simulate
+from baselines.reproduction import at_step
 from baselines.super_twisting import SuperTwistingGains
+from usm_gym.scenario import PRESETS, named
 
 PAPER = SuperTwistingGains()
 L = PAPER.observer_gain
@@ -72,3 +83,28 @@ def test_the_error_then_decays_exponentially(surface):
     rates = np.diff(np.log(trace.error[after])[::1000]) / (1000 * STEP)
     assert len(rates) >= 4
     np.testing.assert_allclose(rates, -surface, rtol=0.02)
+
+
+def operation_run(name):
+    scenario = at_step(named(name, "operation", PRESETS["ideal"]), 5e-4)
+    return simulate(scenario, Law(implicit=True, super_twisting=PAPER), every=2)
+
+
+def test_joints_behind_a_filter_are_no_match_for_the_observer():
+    record = operation_run("nominal")
+    rate = disturbance_rate(record)[record.time[1:] > 1.0].max()
+    assert 1.0 < rate < L / 5.0
+    settled = record.time > 5.0
+    assert np.abs(record.observer_error[settled]).max() < 1e-6
+    assert np.abs(record.error[settled]).max() < 1e-6
+
+
+def test_stepped_joints_break_the_premise_and_the_loop_stays_bounded():
+    record = operation_run("table1")
+    rate = disturbance_rate(record)
+    assert rate[record.time[1:] > 5.0].max() > 50.0 * L
+    assert 2e-3 < np.abs(record.error[record.time > 5.0]).max() < 2e-2
+    shift = record.time > 20.0
+    assert np.abs(record.observer_error[shift & (record.time < 20.1)]).max() > 1e-4
+    calm = shift & (record.time > 22.0) & (record.time < 29.9)
+    assert np.abs(record.observer_error[calm]).max() < 1e-6
