@@ -32,7 +32,7 @@ UNLIMITED = 1000.0
 SAMPLE_TIME = 1e-3
 HEADING_GAIN = 125.0
 # Sliding variable at the start that makes the printed settled errors of the STA, m/s.
-SIGMA_START = (0.0074, 0.0063)
+SIGMA_START = (0.0070, 0.0057)
 
 # Table 1, and the settled errors in operation mode of section 5.3, m.
 PAPER = {

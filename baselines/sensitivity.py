@@ -38,7 +38,11 @@ SENSORS_AND_THRUSTERS: dict[str, dict[str, Any]] = {
     "ideal": {},
     "noise": {"position_noise": 5e-5},
     "lag": {"thruster_time_constant": 0.05},
-    "noise and lag": {"position_noise": 5e-5, "thruster_time_constant": 0.05},
+    "noise, lag, 20 N": {
+        "position_noise": 5e-5,
+        "thruster_time_constant": 0.05,
+        "thruster_limit": 20.0,
+    },
 }
 
 

@@ -198,7 +198,7 @@ def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path):
     ("arguments", "message"),
     [
         (("--step", "0"), "--step is 0.0"),
-        (("--step", "-1e-5"), "--step is -1e-05"),
+        (("--step=-1e-5",), "--step is -1e-05"),
         (("--step", "3e-6"), "--step is 3e-06"),
         (("--step", "nan"), "--step is nan"),
         (("--step", "2e-3"), "--step is 0.002"),
