@@ -76,7 +76,7 @@ def link_ends(record: Record, sample: int, robot: Robot) -> Array:
 def _bodies(record: Record, row: str) -> Any:
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(9, 3.2), layout="constrained")
+    figure, axes = plt.subplots(figsize=(9, 2.4), layout="constrained")
     position = record.reference + record.error
     axes.plot(
         *record.reference.T, "--", color="k", linewidth=1, label="reference of the CM", zorder=4
@@ -111,7 +111,7 @@ def _signals(record: Record, row: str) -> Any:
             label=f"$p_{{{name},ref}}$",
         )
         second = record.sigma if row == "sta" else 1e3 * record.error
-        panels[1].plot(record.time, second[:, axis], color=colour, label=name)
+        panels[1].plot(record.time, second[:, axis], color=colour, linewidth=0.8, label=name)
         panels[2].plot(record.time, record.force[:, axis], color=colour, label=name)
         panels[3].plot(record.time, record.observer_error[:, axis], color=colour, label=name)
     panels[0].set(ylabel="position [m]")

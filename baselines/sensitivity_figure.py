@@ -85,7 +85,9 @@ def _oscillation(panel: Any, results: Results) -> None:
             error(results, ("oscillation", f"{start:g}", "sta"), "torpedo", axis)
             for start in STARTS
         ]
-        panel.loglog(1e3 * np.array(STARTS), 1e3 * np.array(errors), "o-", label=f"ours, {axis}")
+        panel.loglog(
+            1e3 * np.array(STARTS), 1e3 * np.array(errors), "ox"[index], label=f"ours, {axis}"
+        )
         printed = 1e3 * PAPER["sta"]["torpedo"][axis]
         panel.axhline(printed, color=f"C{index}", linestyle=":", label=f"paper, {axis}")
     panel.set(

@@ -109,3 +109,5 @@ def test_the_tables_of_the_paper_in_half_a_minute():
         assert rows["sta"]["settled"][axis] == pytest.approx(rows["sta"]["torpedo"][axis], rel=0.01)
         assert rows["sta"]["torpedo"][axis] < rows["pd"]["torpedo"][axis] / 3.0
         assert rows["sta"]["settled"][axis] < rows["pd"]["settled"][axis] / 8.0
+        peak = rows["sta"]["operation"][axis]
+        assert rows["sta-implicit"]["operation"][axis] == pytest.approx(peak, rel=0.05)
