@@ -107,7 +107,12 @@ def variations() -> dict[str, dict[str, Variation]]:
         "step, explicit": {f"{step:g} s": stepped(step, False) for step in (1e-6, 1e-4, 1e-3)},
         "step, implicit": {f"{step:g} s": stepped(step, True) for step in (1e-5, 1e-4, 1e-3)},
         "exponent of k2": {"2/3": Variation(super_twisting={"k2_exponent": 2 / 3})},
-        "velocity": {"measured, (9)": Variation(law={"measured": True})},
+        "velocity": {
+            "measured, (9)": Variation(law={"measured": True}),
+            "measured; filter, 30 rad/s": Variation(
+                law={"measured": True}, inspection={"filter_frequency": 30.0}
+            ),
+        },
         "PD": {
             "in 1/s^2": Variation(pd_reading=MASS),
             "in (19)": Variation(pd_reading=OBSERVER),
