@@ -7,8 +7,8 @@ the heading gain and the observer's start (docs/reproduction.md).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from multiprocessing.pool import ThreadPool
 from typing import Any, TypeVar
 
 import numpy as np
@@ -115,16 +115,11 @@ def side_by_side(
 ) -> Iterator[tuple[K, R]]:
     """Results of a function by the name of its argument, as they come.
 
-    Kernels leave the interpreter free, so threads are enough. When interrupted, what has begun is
-    finished and the rest dropped.
+    Kernels leave the interpreter free, so threads are enough; an interruption does not wait for
+    them.
     """
-    with ThreadPoolExecutor(workers) as pool:
-        futures = {pool.submit(function, each): name for name, each in arguments.items()}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    with ThreadPool(workers) as pool:
+        yield from pool.imap_unordered(lambda item: (item[0], function(item[1])), arguments.items())
 
 
 def run_cases(
