@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from typing import Any
 
 import joblib
 
+from usm_gym.files import check_writable
 from usm_gym.scenario import Conditions, conditions_of
 from usm_gym.validation import require
 
@@ -96,7 +96,8 @@ def output_folder(name: str) -> Path:
     """An output folder with figures, made if it is not there.
 
     Raises:
-        ValueError: If figures cannot be drawn, or nothing can be written there.
+        ValueError: If figures cannot be drawn.
+        OSError: If nothing can be written there.
     """
     require(
         find_spec("matplotlib") is not None,
@@ -106,5 +107,5 @@ def output_folder(name: str) -> Path:
     )
     folder = Path(name)
     folder.mkdir(parents=True, exist_ok=True)
-    require(os.access(folder, os.W_OK), "--output", name, "a folder that can be written")
+    check_writable(folder / "table")
     return folder

@@ -1,7 +1,8 @@
-"""Plant and laws in one compiled loop, an action in every physics step, no thruster limit."""
+"""Plant and laws in one compiled loop, for control periods down to the paper's step."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from baselines.observer import observe, observer_gains
 from baselines.pd import PDGains, pd_force
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
+from usm_gym.metrics import LOST_ERROR
 from usm_gym.plant.chain import kinematics
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.lanes import WIDTH, block_at, spread
@@ -31,6 +33,8 @@ class Law(NamedTuple):
 
     Attributes:
         reading: `SUPER_TWISTING`, or a reading of the PD controller as an index of `pd.READINGS`.
+        measured: Whether the velocity is measured and no observer needed, the paper's first case:
+            the sliding variable is then (9).
         implicit: Whether observer and super-twisting law are discretised implicitly.
         super_twisting: Gains of the super-twisting controller.
         pd: Gains of the PD controller.
@@ -38,6 +42,7 @@ class Law(NamedTuple):
     """
 
     reading: int = SUPER_TWISTING
+    measured: bool = False
     implicit: bool = False
     super_twisting: SuperTwistingGains = SuperTwistingGains(heading_gain=125.0)
     pd: PDGains = PDGains(heading_gain=125.0)
@@ -45,7 +50,7 @@ class Law(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a run leaves, at every `every`-th step after the first, (samples, ...).
+    """What a run leaves, at every `every`-th physics step from the first on, (samples, ...).
 
     Attributes:
         time: Times, s, (samples,).
@@ -54,7 +59,8 @@ class Record(NamedTuple):
         force: Force on the centre of mass, N, (samples, 2).
         sigma: Sliding variable, m/s, (samples, 2).
         observer_error: e1 = p - p1, m, (samples, 2).
-        effort: Mean absolute force of the thrusters, N, (samples,).
+        disturbance: Acceleration less that by the force, f(t) / m_t of (23), m/s^2, (samples, 2).
+        effort: Mean absolute command of the thrusters, N, (samples,).
         theta: Link angles, rad, (samples, links).
     """
 
@@ -64,13 +70,14 @@ class Record(NamedTuple):
     force: Array
     sigma: Array
     observer_error: Array
+    disturbance: Array
     effort: Array
     theta: Array
 
 
 def record_for(samples: int, links: int) -> Record:
     """An empty record."""
-    pairs = np.empty((5, samples, 2))
+    pairs = np.empty((6, samples, 2))
     return Record(
         time=np.empty(samples),
         reference=pairs[0],
@@ -78,62 +85,83 @@ def record_for(samples: int, links: int) -> Record:
         force=pairs[2],
         sigma=pairs[3],
         observer_error=pairs[4],
+        disturbance=pairs[5],
         effort=np.empty(samples),
         theta=np.empty((samples, links)),
     )
 
 
 def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None = None) -> Record:
-    """Run a law on a scenario, both at its physics step.
+    """Run a law on a scenario.
 
     Args:
-        scenario: The scenario; its control period has to be its physics step.
+        scenario: The scenario.
         law: The control law.
-        every: Record every so many steps.
+        every: Record every so many physics steps.
         robot: The robot; without one, the paper's.
 
     Raises:
-        ValueError: If control period and physics step differ, or the closed loop diverges.
+        ValueError: If the robot is lost.
     """
     conditions = scenario.conditions
+    body = robot or Robot()
+    # Of this simulation only the start is used: it need not hold the noise of a whole episode.
+    simulation = Simulation(body, [replace(scenario, duration=conditions.control_period)])
+    noise = scenario.noise() if conditions.position_noise else np.zeros((1, 2))
+    record = record_for(scenario.steps * conditions.substeps // every, body.links)
+    blocks, plant = simulation.fleet.blocks, simulation.plant
+    closed_loop(blocks, plant, body.total_mass, law, noise, every, record)
     require(
-        conditions.substeps == 1,
+        np.abs(record.error).max() <= LOST_ERROR,
         "control_period",
         conditions.control_period,
-        f"the physics step, {conditions.physics_step}",
-    )
-    body = robot or Robot()
-    simulation = Simulation(body, [scenario])
-    record = record_for(scenario.steps // every, body.links)
-    closed_loop(simulation.fleet.blocks, simulation.plant, body.total_mass, law, every, record)
-    require(
-        np.isfinite(record.error).all(),
-        "physics_step",
-        conditions.physics_step,
-        "a step at which the closed loop stays finite",
+        "a period at which the robot is not lost",
     )
     return record
 
 
 @piece
-def law_force(law, k, started, error, rate, acceleration, start, force, h, mass, state):
+def law_force(law, k, started, error, speed, rate, acceleration, start, force, h, mass, state):
     """One step of observer and law in one axis: the force on the centre of mass, N.
 
-    Arguments in the axis: position error (m), rate (m/s) and acceleration (m/s^2) of the reference,
-    p2(0) (m/s), the force of the last step (N).
+    Arguments in the axis: measured position error (m) and speed (m/s), the reference's rate (m/s)
+    and acceleration (m/s^2), p2(0) (m/s), the force of the last step (N).
     """
-    u = force / mass - acceleration
-    z1, z2 = observe(law.implicit, started, error, u, rate - start, h, k, state)
+    if law.measured:
+        z1, z2 = 0.0, 0.0
+        state[0], state[1] = error, speed - rate
+    else:
+        u = force / mass - acceleration
+        z1, z2 = observe(law.implicit, started, error, u, rate - start, h, k, state)
     if law.reading == SUPER_TWISTING:
         gains = law.super_twisting
         return super_twisting_force(z1, z2, acceleration, h, mass, gains, law.implicit, state)
     return pd_force(z1, z2, acceleration, mass, law.pd, law.reading, state)
 
 
+@piece
+def saturate(T, limit, commands, f_x, f_y):
+    """Cut thruster commands (N) at the limit; the forces (N) that they then make."""
+    beyond = False
+    for j in range(commands.size):
+        beyond |= abs(commands[j]) > limit
+    if beyond:
+        f_x, f_y = 0.0, 0.0
+        for j in range(commands.size):
+            commands[j] = min(max(commands[j], -limit), limit)
+            f_x += T[0, j] * commands[j]
+            f_y += T[1, j] * commands[j]
+    return f_x, f_y
+
+
 @compiled
-def closed_loop(blocks, plant, mass, law, every, record):
-    """Plant, observer, control law and allocation, step by step; fills in the record."""
-    links, h = plant.links, plant.h
+def closed_loop(blocks, plant, mass, law, noise, every, record):
+    """Plant, observer, control law and allocation, step by step; fills in the record.
+
+    `noise` (m) has a row for each control instant; when it ends, its last row stays.
+    """
+    links, h, substeps = plant.links, plant.h, plant.substeps
+    period = substeps * h
     block, wide = block_at(blocks, 0, 0.0), spread(0.0)
     row = blocks[0]
     sine = row[row_of(SIN, links) : row_of(SIN, links) + links]
@@ -157,20 +185,52 @@ def closed_loop(blocks, plant, mass, law, every, record):
         t = step * h
         p_x, p_y, v_x, v_y, a_x, a_y = path(t, row[SPEED], row[SWAY], row[FREQUENCY], row[RAMP])
         e_x, e_y = row[P_X] - p_x, row[P_Y] - p_y
-        started = float(step)
-        f_x = law_force(law, k, started, e_x, v_x, a_x, start_x, f_x, h, mass, state_x)
-        f_y = law_force(law, k, started, e_y, v_y, a_y, start_y, f_y, h, mass, state_y)
         if plant.moving_water:
             move_water(block, 0.0, h)
         base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
-        heading = 0.0
-        for i in range(links):
-            heading += theta[i]
-        heading = heading / links if row[HEAD_HEADING] == 0.0 else theta[links - 1]
-        distance = row[P_Y] - (p_y if row[CROSS_TRACK] > 0.0 else 0.0)
-        moment = -heading_gain * (heading - line_of_sight(distance, row[LOOK_AHEAD]))
-        allocation_matrix(sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T)
-        allocate(T, f_x, f_y, moment, commands)
+        if step % substeps == 0:
+            instant = step // substeps
+            started = float(instant)
+            noise_x, noise_y = noise[min(instant, noise.shape[0] - 1)]
+            f_x = law_force(
+                law,
+                k,
+                started,
+                e_x + noise_x,
+                row[V_X],
+                v_x,
+                a_x,
+                start_x,
+                f_x,
+                period,
+                mass,
+                state_x,
+            )
+            f_y = law_force(
+                law,
+                k,
+                started,
+                e_y + noise_y,
+                row[V_Y],
+                v_y,
+                a_y,
+                start_y,
+                f_y,
+                period,
+                mass,
+                state_y,
+            )
+            heading = 0.0
+            for i in range(links):
+                heading += theta[i]
+            heading = heading / links if row[HEAD_HEADING] == 0.0 else theta[links - 1]
+            distance = row[P_Y] + noise_y - (p_y if row[CROSS_TRACK] > 0.0 else 0.0)
+            moment = -heading_gain * (heading - line_of_sight(distance, row[LOOK_AHEAD]))
+            allocation_matrix(
+                sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T
+            )
+            allocate(T, f_x, f_y, moment, commands)
+            f_x, f_y = saturate(T, row[LIMIT], commands, f_x, f_y)
         if step % every == 0:
             n = step // every
             record.time[n] = t
@@ -184,3 +244,6 @@ def closed_loop(blocks, plant, mass, law, every, record):
             record.observer_error[n, 0] = e_x - state_x[0]
             record.observer_error[n, 1] = e_y - state_y[0]
         physics_step(block, 0.0, wide, WIDTH, plant, base)
+        if step % every == 0:
+            record.disturbance[step // every, 0] = row[A_X] - f_x / mass
+            record.disturbance[step // every, 1] = row[A_Y] - f_y / mass

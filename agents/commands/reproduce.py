@@ -1,9 +1,10 @@
-"""`usm reproduce`: the paper's Table 1 and Figures 3 to 10."""
+"""`usm reproduce`: the paper's Table 1 and figures, and what hangs on its open items."""
 
 from __future__ import annotations
 
 import argparse
 import os
+from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -15,23 +16,39 @@ from baselines.reproduction import (
     HEADING_GAIN,
     IMPLICIT_STEP,
     PAPER,
+    SAMPLE_TIME,
     SIGMA_START,
     STEP,
     cases,
     run_cases,
     table,
 )
+from baselines.reproduction_figures import NAMES
 from usm_gym.files import write_json, write_text
 from usm_gym.provenance import provenance
 from usm_gym.scenario import MODES, Scenario, named
+from usm_gym.validation import require
 
 DESCRIPTION = """\
 Run the paper as printed: explicit laws and observer at a step of 1e-5 s, ideal thrusters without
 limit, its gains, on the declared scenario `table1`; print our Table 1 beside the paper's. With
---output, also write table1.json, table1.md and fig03.png to fig10.png into a folder (the figures
-need the extra `render`). Takes about half a minute on two cores.
+--output, also write table1.json, table1.md and the figures into a folder (the figures need the
+extra `render`). Takes less than a minute on two cores.
+
+--study and --fit write into the same folder, take some minutes, and go on where they stopped when
+they are started again.
+"""
+EXAMPLES = """\
+examples:
+  usm reproduce                                    the table
+  usm reproduce --output paper                     the table and all figures
+  usm reproduce --output paper --figures fig05,fig07
+  usm reproduce --step 1e-4                        at another step
+  usm reproduce --output paper --study             every open item one at a time
+  usm reproduce --output paper --fit               refit the declared scenario
 """
 COLUMNS = [(part, axis) for part in ("torpedo", "operation", "settled") for axis in ("x", "y")]
+GENERATIONS = 60
 
 
 def add_to(subparsers: Any) -> None:
@@ -40,26 +57,47 @@ def add_to(subparsers: Any) -> None:
         "reproduce",
         help="regenerate the paper's Table 1 and figures",
         description=DESCRIPTION,
+        epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--output", metavar="DIR", help="folder for the table and the figures")
+    add = parser.add_argument
+    add("--output", metavar="DIR", help="folder for the table and the figures")
+    add("--figures", metavar="A,B", help=f"which figures ({', '.join(NAMES)}; default: all)")
+    add("--step", type=float, default=STEP, metavar="S", help="step, s (default: 1e-5)")
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--study", action="store_true", help="vary every open item instead")
+    other.add_argument("--fit", action="store_true", help="refit the declaration instead")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Run all cases, print the table, write the folder."""
+    """Make the table, the study or the fit."""
+    names = chosen_figures(arguments.figures)
+    check_step(arguments.step)
+    extra = [f"--{name}" for name in ("study", "fit", "figures") if getattr(arguments, name)]
+    require(arguments.output or not extra, "--output", None, f"a folder, for {' '.join(extra)}")
     folder = None if arguments.output is None else output_folder(arguments.output)
-    chosen = cases()
+    if folder and arguments.study:
+        run_study(folder)
+    elif folder and arguments.fit:
+        run_fit(folder)
+    else:
+        run_table(folder, arguments.step, names)
+
+
+def run_table(folder: Path | None, step: float, names: list[str]) -> None:
+    """Run all cases, print the table, write the folder."""
+    chosen = cases(step)
     with progress_bar() as bar:
         task = bar.add_task("runs", total=len(chosen))
-        records = run_cases(chosen, os.cpu_count() or 1, lambda: bar.advance(task))
+        records = run_cases(chosen, workers(), lambda: bar.advance(task))
     result = table(chosen, records)
     output_console().print(terminal_table(result["rows"]))
     if folder is None:
         return
     scenario: dict[str, Scenario] = {mode: named("table1", mode) for mode in MODES}
     document = {
-        "step": STEP,
+        "step": step,
         "settle_time": scenario["operation"].settle_time,
         **result,
         "paper": PAPER,
@@ -73,9 +111,65 @@ def run(arguments: argparse.Namespace) -> None:
     }
     write_json(folder / "table1.json", document)
     write_text(folder / "table1.md", markdown(result["rows"]))
-    from baselines.reproduction_figures import draw_all
+    from baselines.reproduction_figures import draw
 
-    draw_all(records, folder)
+    draw(names, records, folder)
+
+
+def run_study(folder: Path) -> None:
+    """Run the sensitivity study, write study.json and study.png."""
+    from baselines.sensitivity import runs, study
+    from baselines.sensitivity_figure import draw_study
+
+    with progress_bar() as bar:
+        task = bar.add_task("study")
+        runs_done = study(
+            folder / "study.json",
+            workers(),
+            lambda done, total: bar.update(task, completed=done, total=total),
+            runs(),
+        )
+    draw_study(runs_done, folder / "study.png")
+
+
+def run_fit(folder: Path) -> None:
+    """Refit the declaration, write fit.json, print what came of it."""
+    from baselines.reproduction_fit import fit
+
+    with progress_bar() as bar:
+        task = bar.add_task("fit")
+        found = fit(
+            folder / "fit.json",
+            GENERATIONS,
+            workers(),
+            lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    output_console().print(fit_table(found))
+
+
+def workers() -> int:
+    """One thread for each core."""
+    return os.cpu_count() or 1
+
+
+def chosen_figures(text: str | None) -> list[str]:
+    """The figures that the argument asks for."""
+    if text is None:
+        return list(NAMES)
+    chosen = [name.strip() for name in text.split(",") if name.strip()]
+    require(chosen and set(chosen) <= set(NAMES), "--figures", text, ", ".join(NAMES))
+    return chosen
+
+
+def check_step(step: float) -> None:
+    """Refuse a step at which the records' instants would be missed."""
+    count = SAMPLE_TIME / step if step > 0 else 0.0
+    require(
+        count >= 1.0 and abs(count - round(count)) < 1e-6 * count,
+        "--step",
+        step,
+        f"a positive number of which {SAMPLE_TIME:g} s is a multiple",
+    )
 
 
 def lines(rows: dict[str, Any]) -> list[list[str]]:
@@ -91,20 +185,40 @@ def lines(rows: dict[str, Any]) -> list[list[str]]:
     return found
 
 
-def terminal_table(rows: dict[str, Any]) -> Table:
-    """The table for the terminal."""
-    shown = Table(
-        "mm",
-        title="absolute maximum of the position error after settling",
-        title_justify="left",
-        title_style="",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
+def plain_table(first: str, title: str) -> Table:
+    """An empty table for the terminal."""
+    return Table(
+        first, title=title, title_justify="left", title_style="", box=SIMPLE_HEAD, pad_edge=False
     )
+
+
+def terminal_table(rows: dict[str, Any]) -> Table:
+    """Table 1 for the terminal."""
+    shown = plain_table("mm", "absolute maximum of the position error after settling")
     for part, axis in COLUMNS:
         shown.add_column(f"{part}\n{axis}", justify="right")
     for line in lines(rows):
         shown.add_row(*line)
+    return shown
+
+
+def fit_table(found: dict[str, Any]) -> Table:
+    """The numbers that the fit saw, and its freedoms, for the terminal."""
+    shown = plain_table("", "ours over the paper's at a step of 1e-5 s, and what was free")
+    for name in ("declared", "fitted"):
+        shown.add_column(name, justify="right")
+    for part, printed in found["seen"].items():
+        for index, axis in enumerate("xy"):
+            cells = [
+                figures(found[name]["paper"]["numbers"][part][index] / printed[index])
+                for name in ("declared", "fitted")
+            ]
+            shown.add_row(f"{part} {axis}", *cells)
+    cells = [figures(found[name]["paper"]["residual"]) for name in ("declared", "fitted")]
+    shown.add_row("residual", *cells)
+    for freedom in found["freedom"]:
+        cells = [figures(found[name]["freedoms"][freedom]) for name in ("declared", "fitted")]
+        shown.add_row(freedom, *cells)
     return shown
 
 

@@ -188,9 +188,53 @@ def test_a_closed_pipe_leaves_no_traceback():
 
 def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").write_text("")
-    answer = usm("reproduce", "--output", "file/folder", cwd=tmp_path)
+    for folder in ("file/folder", "file"):
+        answer = usm("reproduce", "--output", folder, cwd=tmp_path)
+        assert answer.returncode == 2
+        assert answer.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--step", "0"), "--step is 0.0"),
+        (("--step=-1e-5",), "--step is -1e-05"),
+        (("--step", "3e-6"), "--step is 3e-06"),
+        (("--step", "nan"), "--step is nan"),
+        (("--step", "2e-3"), "--step is 0.002"),
+        (("--figures", "fig05,fig99", "--output", "x"), "--figures is 'fig05,fig99'"),
+        (("--figures", "fig05"), "--output is None"),
+        (("--study",), "--output is None"),
+        (("--study", "--fit", "--output", "x"), "not allowed with"),
+    ],
+)
+def test_reproduce_refuses_bad_input(arguments, message, tmp_path):
+    answer = usm("reproduce", *arguments, cwd=tmp_path)
     assert answer.returncode == 2
+    assert message in answer.stderr
     assert answer.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_reproduce_writes_the_same_bits_twice(tmp_path):
+    """At a step ten times the paper's, to save time."""
+    for name in "ab":
+        options = ("--step", "1e-4", "--figures", "fig04,fig07", "--output", name)
+        answer = usm("reproduce", *options, cwd=tmp_path)
+        assert answer.returncode == 0, answer.stderr
+    documents = [json.loads((tmp_path / name / "table1.json").read_text()) for name in "ab"]
+    commands = [document["provenance"].pop("command") for document in documents]
+    assert commands[0] != commands[1]
+    assert documents[0] == documents[1]
+    assert set(documents[0]["rows"]["sta"]) == {"torpedo", "operation", "settled"}
+    for file in ("table1.md", "fig04.png", "fig07.png"):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [
+        "fig04.png",
+        "fig07.png",
+        "table1.json",
+        "table1.md",
+    ]
 
 
 @pytest.mark.parametrize(
