@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import baselines
-from agents.commands.evaluate import chosen_policies
+from agents.selection import chosen_contenders
 from usm_gym import Robot, evaluate
 from usm_gym.nominal import nominal_of
 from usm_gym.scenario import PRESETS, sample
@@ -40,7 +40,7 @@ def test_alone_and_side_by_side_the_bits_are_the_same() -> None:
 
 def test_is_no_competitor_and_wants_the_truth() -> None:
     episodes = scenarios("field", 1)
-    assert "oracle" not in chosen_policies(None, ROBOT, episodes)
+    assert "oracle" not in [each.name for each in chosen_contenders(None)]
     policy: Any = baselines.make("oracle", nominal_of(ROBOT, episodes[0]))
     assert policy.privileged
     with pytest.raises(ValueError, match="snapshot is None; allowed: the true state"):
