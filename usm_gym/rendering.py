@@ -39,7 +39,7 @@ ALARM = (176, 36, 24)
 # smooths all edges; text is smooth by itself.
 WIDTH, HEIGHT = 640, 480
 OVER = 2
-SCENE = pygame.Rect(0, 52, 640, 262)
+SCENE = pygame.Rect(8, 52, 624, 262)
 LEGEND = 328
 CAPTIONS = 348
 LENS, LENS_RADIUS = (66.0, 416.0), 50.0
@@ -130,7 +130,7 @@ class Canvas:
         for dot in self._in_scene(self._path_dots(picture.path)):
             self._disc(dot, 1.3, INK)
         trail = picture.path[picture.instants] + picture.errors
-        self._line(self._in_scene(_thinned(trail)), 2.2, TRAIL)
+        self._line(self._in_scene(_thinned(trail, 500)), 2.2, TRAIL)
         self._centre_of_mass(self._in_scene(trail[-1:])[0])
         self._large.set_clip(None)
         right, bottom = SCENE.right - 14.0, SCENE.bottom - 8.0
@@ -375,6 +375,16 @@ class Window:
 
 
 _windows: set[pygame.Window] = set()
+
+
+def has_display() -> bool:
+    """Whether a window could be seen; elsewhere they are drawn into memory."""
+    pygame.display.init()
+    try:
+        return pygame.display.get_driver() != "offscreen"
+    finally:
+        if not _windows:
+            pygame.display.quit()
 
 
 def _close(window: pygame.Window | None) -> None:
