@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from usm_gym.metrics import LOST_ERROR
 from usm_gym.picture import Picture, Posture
+from usm_gym.scenario import Scenario
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import matplotlib
@@ -21,6 +22,7 @@ import pygame
 Frame = NDArray[np.uint8]
 Points = NDArray[np.float64]
 Colour = tuple[int, int, int]
+Word = tuple[pygame.Surface, tuple[int, int]]
 
 # Okabe and Ito's colours, which the colour-blind tell apart, and tints of them.
 INK, GREY, FAINT, RULE = (38, 50, 56), (96, 110, 118), (222, 230, 235), (200, 210, 217)
@@ -39,10 +41,10 @@ ALARM = (176, 36, 24)
 # smooths all edges; text is smooth by itself.
 WIDTH, HEIGHT = 640, 480
 OVER = 2
-SCENE = pygame.Rect(8, 52, 624, 262)
+SCENE = pygame.Rect(14, 52, 612, 262)
 LEGEND = 328
 CAPTIONS = 348
-LENS, LENS_RADIUS = (66.0, 416.0), 50.0
+LENS, LENS_RADIUS, LENS_REACH = (66.0, 416.0), 50.0, 42.0
 CHART = pygame.Rect(196, 368, 420, 88)
 METRE = 220.0
 GRID = 0.5
@@ -78,7 +80,8 @@ class Canvas:
         self._frame = pygame.Surface(self.size)
         self._path: Points | None = None
         self._dots = np.empty((0, 2))
-        self._words: list[tuple[pygame.Surface, tuple[int, int]]] = []
+        self._words: list[Word] = []
+        self._still: tuple[Scenario, float, pygame.Surface, tuple[Word, ...]] | None = None
 
     def draw(self, picture: Picture, title: str, scale: float | None = None) -> Frame:
         """Draw a picture.
@@ -92,17 +95,29 @@ class Canvas:
             Red, green and blue, (height, width, 3).
         """
         scale = scale or error_scale(picture.errors)
-        self._large.fill(PAPER)
-        self._words.clear()
+        self._still_parts(picture.scenario, scale)
         self._headline(picture, title)
         self._scene(picture)
-        self._legend(picture)
-        self._lens(picture, scale)
-        self._chart(picture, scale)
+        self._error_in_lens(picture, scale)
+        self._curves(picture, scale)
         pygame.transform.smoothscale(self._large, self.size, self._frame)
         self._frame.blits(self._words)
         pixels = bytearray(pygame.image.tobytes(self._frame, "RGB"))
         return np.frombuffer(pixels, np.uint8).reshape(self.size[1], self.size[0], 3)
+
+    def _still_parts(self, scenario: Scenario, scale: float) -> None:
+        """What all frames of an episode share, kept as long as it is the same."""
+        if self._still is None or self._still[:2] != (scenario, scale):
+            self._words.clear()
+            self._large.fill(PAPER)
+            pygame.draw.rect(self._large, WATER, self._rect(SCENE))
+            self._legend(scenario)
+            self._lens(scale)
+            self._chart(scenario, scale)
+            self._still = (scenario, scale, self._large.copy(), tuple(self._words))
+        _, _, drawn, words = self._still
+        self._large.blit(drawn, (0, 0))
+        self._words[:] = words
 
     def _headline(self, picture: Picture, title: str) -> None:
         settle_time = picture.scenario.settle_time
@@ -120,7 +135,6 @@ class Canvas:
         self._current(picture.current)
 
     def _scene(self, picture: Picture) -> None:
-        pygame.draw.rect(self._large, WATER, self._rect(SCENE))
         self._large.set_clip(self._rect(SCENE))
         self._centre = picture.path[picture.instants[-1]]
         self._grid()
@@ -211,31 +225,31 @@ class Canvas:
         head = np.stack([tip, neck + 4.5 * across, neck - 4.5 * across])
         self._shape(self._at(head), CURRENT, CURRENT)
 
-    def _lens(self, picture: Picture, scale: float) -> None:
-        """The error of the centre of mass, magnified; the reference is in the middle."""
-        reach = LENS_RADIUS - 8
-        magnification = float(f"{reach / scale / METRE:.2g}")
+    def _lens(self, scale: float) -> None:
+        magnification = float(f"{LENS_REACH / scale / METRE:.2g}")
         self._text(f"error, {magnification:g} times as large", (14, CAPTIONS), 10, GREY)
         self._text(_limit(scale), (LENS[0] + LENS_RADIUS + 4, LENS[1] - 7), 10, GREY)
         middle = self._at(np.array(LENS))
         self._disc(middle, LENS_RADIUS + 1.2, RULE)
         self._disc(middle, LENS_RADIUS, WATER)
         for share in (1.0, 0.5):
-            self._disc(middle, share * reach + 0.5, RULE)
-            self._disc(middle, share * reach - 0.5, WATER)
-        for arm in ((reach, 0.0), (0.0, reach)):
+            self._disc(middle, share * LENS_REACH + 0.5, RULE)
+            self._disc(middle, share * LENS_REACH - 0.5, WATER)
+        for arm in ((LENS_REACH, 0.0), (0.0, LENS_REACH)):
             ends = np.stack([np.subtract(LENS, arm), np.add(LENS, arm)])
             self._line(self._at(ends), 0.8, RULE)
+
+    def _error_in_lens(self, picture: Picture, scale: float) -> None:
+        """The error of the centre of mass, magnified; the reference is in the middle."""
         past = round(LENS_PAST / picture.scenario.conditions.control_period)
         marks = picture.errors[-past:] / scale
         marks /= np.maximum(np.hypot(*marks.T), 1.0)[:, np.newaxis]
-        points = self._at(np.array(LENS) + reach * marks * (1, -1))
+        points = self._at(np.array(LENS) + LENS_REACH * marks * (1, -1))
         self._line(_thinned(points), 1.2, TRAIL)
-        self._disc(middle, 2.5, REFERENCE)
+        self._disc(self._at(np.array(LENS)), 2.5, REFERENCE)
         self._centre_of_mass(points[-1])
 
-    def _chart(self, picture: Picture, scale: float) -> None:
-        scenario = picture.scenario
+    def _chart(self, scenario: Scenario, scale: float) -> None:
         x = self._text("error of the centre of mass:", (CHART.left, CAPTIONS), 10, GREY)
         for axis, colour in enumerate(ERROR_COLOURS):
             x = self._text("xy"[axis], (x + 8, CAPTIONS), 10, colour)
@@ -245,7 +259,7 @@ class Canvas:
         for mark in np.linspace(0.0, scenario.duration, 5):
             x = CHART.left + CHART.width * mark / scenario.duration
             self._text(f"{mark:g} s", (x, CHART.bottom + 4), 10, GREY, MIDDLE)
-        left, width = CHART.left, CHART.width / scenario.duration
+        width = CHART.width / scenario.duration
         settling = pygame.Rect(CHART.topleft, (round(scenario.settle_time * width), CHART.height))
         pygame.draw.rect(self._large, WATER, self._rect(settling))
         for share in (-1.0, 0.0, 1.0):
@@ -253,21 +267,25 @@ class Canvas:
             ends = np.array([[CHART.left, y], [CHART.right, y]])
             self._line(self._at(ends), 0.8, RULE)
         for shift in scenario.shifts:
-            self._dashes(left + shift * width, CHART.top, CHART.bottom)
+            self._dashes(CHART.left + shift * width, CHART.top, CHART.bottom)
+
+    def _curves(self, picture: Picture, scale: float) -> None:
+        scenario = picture.scenario
         time = picture.instants * scenario.conditions.control_period
         heights = np.clip(picture.errors / scale, -1.0, 1.0) * CHART.height / 2
         for axis, colour in enumerate(ERROR_COLOURS):
-            curve = np.stack([left + time * width, CHART.centery - heights[:, axis]], axis=1)
+            across = CHART.left + CHART.width * time / scenario.duration
+            curve = np.stack([across, CHART.centery - heights[:, axis]], axis=1)
             self._line(self._at(_thinned(curve)), 1.5, colour)
             self._disc(self._at(curve[-1]), 2.2, colour)
 
-    def _legend(self, picture: Picture) -> None:
+    def _legend(self, scenario: Scenario) -> None:
         """What the signs mean; each sign is drawn left of its name."""
-        limit = picture.scenario.conditions.thruster_limit
+        limit = scenario.conditions.thruster_limit
         jet = 0.5 * JET_LENGTH * METRE
         signs = [("head", 16.0), ("centre of mass", 13.0), ("path", 20.0), ("track", 18.0)]
         signs += [("reference posture", 20.0), (f"thrust of {limit / 2:g} N", jet)]
-        signs += [("joints bend", 6.0)] if picture.scenario.shifts else []
+        signs += [("joints bend", 6.0)] if scenario.shifts else []
         x, y = 14.0, LEGEND
         for k, (name, width) in enumerate(signs):
             ends = self._at(np.array([[x, y], [x + width, y]]))
