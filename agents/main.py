@@ -17,11 +17,12 @@ from agents.commands import (
     reproduce,
     robustness,
     tune,
+    watch,
 )
 from agents.terminal import Parser
 from usm_gym.validation import in_one_line
 
-COMMANDS = (policies, evaluate, compare, leaderboard, robustness, tune, reproduce, bench)
+COMMANDS = (policies, evaluate, compare, leaderboard, robustness, tune, watch, reproduce, bench)
 
 DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
@@ -32,6 +33,7 @@ A first look, in half a minute:
   usm compare A B              whether one of them is better than another
   usm leaderboard              all of them on all frozen suites
   usm robustness --vary noise  how they fare when something gets worse
+  usm watch                    one of them at work
   usm tune POLICY              better gains for one of them
   usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here

@@ -120,8 +120,8 @@ class SB3VecEnv(VecEnv):
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[np.ndarray[Any, Any] | None]:
-        """No pictures."""
-        return [None] * self.num_envs
+        """The image of the one robot that is rendered, or none."""
+        return list(self._envs.render() or ())
 
 
 def _info_of(infos: dict[str, Any], index: int) -> dict[str, Any]:

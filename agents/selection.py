@@ -33,8 +33,8 @@ def add_policies(parser: argparse.ArgumentParser, default: str = "all competitor
     parser.add_argument("--policies", metavar="A,B", help=f"names, by commas (default: {default})")
 
 
-def add_scenarios(parser: argparse.ArgumentParser) -> None:
-    """Add the options that choose scenarios."""
+def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None:
+    """Add the options that choose scenarios, or a single one."""
     add = parser.add_argument
     add(
         "--suite",
@@ -42,7 +42,11 @@ def add_scenarios(parser: argparse.ArgumentParser) -> None:
         help=f"frozen suite ({', '.join(NAMES)}; default: operation) or a file of scenarios",
     )
     add("--seed", type=int, metavar="S", help="sample scenarios under this seed instead")
-    add("--episodes", type=int, metavar="N", help="how many to sample (default: 50)")
+    if single:
+        add("--scenario", type=int, metavar="I", help="which of them, from 0 on (default: 0)")
+        parser.set_defaults(episodes=None)
+    else:
+        add("--episodes", type=int, metavar="N", help="how many to sample (default: 50)")
     add("--mode", choices=MODES, help="mode of sampled scenarios (default: operation)")
     add(
         "--conditions",
@@ -112,6 +116,16 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
         sample(mode, conditions or Conditions(), stream(seed, EVALUATION, i))
         for i in range(episodes)
     ]
+
+
+def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
+    """The one scenario that the options ask for."""
+    index = count(arguments, "scenario", 0, least=0)
+    if sampled(arguments):
+        arguments.episodes = index + 1
+    scenarios = chosen_scenarios(arguments)
+    require(index < len(scenarios), "--scenario", index, f"0 to {len(scenarios) - 1}")
+    return scenarios[index]
 
 
 def read_suite(name: str) -> list[Scenario]:

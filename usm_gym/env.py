@@ -16,6 +16,7 @@ from usm_gym.robot import Robot, robot_of
 from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named, sample
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.validation import require
+from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observation = NDArray[np.float32]
 
@@ -84,14 +85,16 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     |---|---|---|
     | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of `Conditions` fields |
     | `robot` | the paper's | a dict of `Robot` fields |
-    | `render_mode` | None | no pictures yet |
+    | `render_mode` | None | `"rgb_array"`: `render()` gives an image of 640 x 480; `"human"`: a \
+window shows every step in real time (both need the extra `render`) |
 
     ## Version history
 
     - v0: first version.
     """
 
-    metadata = {"render_modes": [], "render_fps": 50}  # noqa: RUF012 (Gymnasium's declaration)
+    # One frame for each control period; an instance corrects the rate if it has another period.
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 (Gymnasium's)
 
     def __init__(
         self,
@@ -104,12 +107,14 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
 
         Raises:
             ValueError: If a condition, a field of the robot or the render mode is not allowed.
+            gymnasium.error.DependencyNotInstalled: If the render mode needs the extra `render`.
         """
-        require(render_mode is None, "render_mode", render_mode, "None")
         self.mode = mode
         self.conditions = conditions_of(conditions)
         self.robot = robot_of(robot)
         self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": render_fps(self.conditions)}
+        self._viewer = None if render_mode is None else Viewer(render_mode)
         self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
         self.observation_space = self.layout.space
         self.action_space = action_space(self.robot)
@@ -146,6 +151,8 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
         scenario = scenario_of(options, self.mode, self.conditions, self.robot, self.np_random)
         self._simulation = Simulation(self.robot, [scenario])
         self._over = False
+        if self._viewer is not None:
+            self._viewer.follow(self._simulation)
         return self._simulation.observation[0].copy(), self._info()
 
     def step(
@@ -164,6 +171,8 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
         simulation.step(batch)
         rewards, terminated, truncated = outcome(simulation)
         self._over = bool(terminated[0] or truncated[0])
+        if self._viewer is not None:
+            self._viewer.follow(simulation)
         return (
             simulation.observation[0].copy(),
             float(rewards[0]),
@@ -171,6 +180,15 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
             bool(truncated[0]),
             self._info(),
         )
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """An image of the present, (480, 640, 3), in the mode "rgb_array"; otherwise None."""
+        return None if self._viewer is None else self._viewer.render(self._running)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
 
     def snapshot(self) -> Snapshot:
         """Copy the whole simulation state."""
@@ -197,6 +215,11 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
 USMEnv.__doc__ = (USMEnv.__doc__ or "").replace(
     "OBSERVATION_TABLE", ObservationLayout(16, 5).table().replace("\n", "\n    ")
 )
+
+
+def render_fps(conditions: Conditions) -> int:
+    """Frames per second at which one frame per control period is real time."""
+    return max(1, round(1 / conditions.control_period))
 
 
 def action_space(robot: Robot) -> gym.Space[NDArray[np.float32]]:

@@ -139,14 +139,18 @@ def rollout(
     scenarios: Sequence[Scenario],
     robot: Robot,
     progress: Callable[[float], None] = lambda episodes: None,
+    watch: Callable[[Simulation], None] = lambda simulation: None,
 ) -> list[Trajectory]:
-    """Run a policy through scenarios, side by side as far as their timing agrees."""
+    """Run a policy through scenarios, side by side as far as their timing agrees.
+
+    `watch` is called with each simulation at its start and after each step.
+    """
     trajectories: dict[int, Trajectory] = {}
     order = sorted(range(len(scenarios)), key=lambda i: (scenarios[i].conditions.timing, i))
     for _, group in groupby(order, key=lambda i: scenarios[i].conditions.timing):
         indices = list(group)
         batch = [scenarios[i] for i in indices]
-        trajectories.update(zip(indices, _run(policy, batch, robot, progress), strict=True))
+        trajectories.update(zip(indices, _run(policy, batch, robot, progress, watch), strict=True))
     return [trajectories[i] for i in range(len(scenarios))]
 
 
@@ -184,8 +188,10 @@ def _run(
     scenarios: Sequence[Scenario],
     robot: Robot,
     progress: Callable[[float], None],
+    watch: Callable[[Simulation], None],
 ) -> list[Trajectory]:
     simulation = Simulation(robot, scenarios)
+    watch(simulation)
     size, thrusters = simulation.size, len(robot.thrusters)
     length = int(simulation.steps.max())
     error = np.empty((length, size, 2))
@@ -225,6 +231,7 @@ def _run(
         alive = (k < ends) & ~lost
         require(not np.isnan(action[alive]).any(), "the policy's action", "NaN", "numbers")
         simulation.step(np.clip(np.nan_to_num(action), -1.0, 1.0))
+        watch(simulation)
         error[k], heading[k] = simulation.error, simulation.heading_error
         command[k] = simulation.command
         now = simulation.lost & alive

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,21 +25,32 @@ def check_writable(path: str | Path) -> None:
         raise type(error)(f"cannot write {target}: {error.strerror}") from error
 
 
-def write_text(path: str | Path, text: str) -> None:
-    """Write a file in one move: readers, and an interruption, see the old or the new one."""
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Give a new file to write instead of `path`, whose place it takes at the end, in one move.
+
+    Readers, and an interruption, see the old or the new one. The new one has the same suffix.
+    """
     target = Path(path)
-    with tempfile.NamedTemporaryFile(
-        "w", dir=target.parent, prefix=target.name, suffix=".part", delete=False, encoding="utf-8"
-    ) as part:
-        try:
-            part.write(text)
-            part.flush()
-            os.fsync(part.fileno())
-            os.chmod(part.name, 0o666 & ~_umask())
-            os.replace(part.name, target)
-        except BaseException:
-            os.unlink(part.name)
-            raise
+    handle, name = tempfile.mkstemp(
+        dir=target.parent, prefix=f"{target.stem}.part", suffix=target.suffix
+    )
+    os.close(handle)
+    try:
+        yield Path(name)
+        with open(name, "rb") as written:
+            os.fsync(written.fileno())
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, target)
+    except BaseException:
+        os.unlink(name)
+        raise
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file in one move."""
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def write_json(path: str | Path, data: Any) -> None:

@@ -190,6 +190,22 @@ class Robot:
         """Whether each thruster pushes across its link, bool, shape (thrusters,)."""
         return np.array([each.direction == "normal" for each in self.thrusters], dtype=np.bool_)
 
+    def link_centres(
+        self, theta: NDArray[np.float64], position: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Centres of the links in the global frame (docs/model.md section 2).
+
+        Args:
+            theta: Link angles, rad, shape (links,).
+            position: Centre of mass, m, shape (2,).
+
+        Returns:
+            Positions, m, shape (links, 2).
+        """
+        halves = self.half_length * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+        from_tail = 2 * np.cumsum(halves, axis=0) - halves
+        return np.asarray(from_tail - from_tail.mean(axis=0) + position)
+
     def _straight_allocation(self) -> NDArray[np.float64]:
         normal = self.thruster_is_normal
         position = 2 * self.thruster_links - (self.links - 1)

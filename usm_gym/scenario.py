@@ -16,6 +16,7 @@ from pydantic import Field, Strict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from usm_gym.plant.layout import MAX_SHIFTS
+from usm_gym.plant.motion import path_positions
 from usm_gym.robot import Hydrodynamics
 from usm_gym.validation import CONFIG, Count, NonNegative, Number, Positive, Switch, require
 
@@ -242,6 +243,21 @@ class Scenario:
         """Measurement error of the position at every control instant, m, shape (steps + 1, 2)."""
         stream = np.random.default_rng(np.random.SeedSequence(self.noise_seed, spawn_key=(NOISE,)))
         return self.conditions.position_noise * stream.standard_normal((self.steps + 1, 2))
+
+    def reference_positions(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Reference of the position at every control instant, m, shape (steps + 1, 2)."""
+        conditions, path = self.conditions, self.path
+        instants = np.arange(self.steps + 1) * conditions.substeps
+        positions = np.empty((self.steps + 1, 2))
+        path_positions(
+            instants * conditions.physics_step,
+            path.speed,
+            path.amplitude,
+            path.frequency,
+            path.ramp,
+            positions,
+        )
+        return positions
 
     def under(self, conditions: Conditions) -> Scenario:
         """The same episode under other conditions, its water redrawn from the same noise seed."""

@@ -107,6 +107,17 @@ class Simulation:
         return self._columns(first, len(self.robot.thrusters))
 
     @property
+    def force(self) -> NDArray[np.float64]:
+        """Forces of the thrusters, which lag behind the commands, N, (size, thrusters)."""
+        thrusters = len(self.robot.thrusters)
+        return self._columns(rows.first_command(self.robot.links) + thrusters, thrusters)
+
+    @property
+    def current(self) -> NDArray[np.float64]:
+        """Velocity of the water, m/s, (size, 2)."""
+        return np.stack([self._column(rows.WATER_X), self._column(rows.WATER_Y)], axis=1)
+
+    @property
     def theta(self) -> NDArray[np.float64]:
         """True link angles, rad, (size, links)."""
         links = self.robot.links

@@ -12,13 +12,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from usm_gym.env import action_space, checked_action, infos, outcome, scenario_of
+from usm_gym.env import action_space, checked_action, infos, outcome, render_fps, scenario_of
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot, robot_of
 from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named
 from usm_gym.simulation import Simulation
 from usm_gym.validation import require
+from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -46,6 +47,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
+        render_index: int = 0,
     ) -> None:
         """Make the environment.
 
@@ -54,17 +56,23 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             mode: "operation" or "torpedo".
             conditions: As of `USMEnv`.
             robot: As of `USMEnv`.
-            render_mode: As of `USMEnv`.
+            render_mode: As of `USMEnv`, of one robot.
             autoreset_mode: What happens to a robot whose episode has ended.
             threads: How many threads share a step, at most one per core; without effect on its
                 result.
+            render_index: Which robot is rendered.
 
         Raises:
             ValueError: If an argument is not allowed.
         """
         require(isinstance(num_envs, int) and num_envs >= 1, "num_envs", num_envs, "1 or more")
         require(isinstance(threads, int) and threads >= 1, "threads", threads, "1 or more")
-        require(render_mode is None, "render_mode", render_mode, "None")
+        require(
+            isinstance(render_index, int) and 0 <= render_index < num_envs,
+            "render_index",
+            render_index,
+            f"0 to {num_envs - 1}",
+        )
         self.num_envs = num_envs
         self.mode = mode
         self.conditions = conditions_of(conditions)
@@ -72,7 +80,12 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         self.threads = threads
         self.render_mode = render_mode
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": render_fps(self.conditions),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self._viewer = None if render_mode is None else Viewer(render_mode, render_index)
         self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
         self.single_observation_space = self.layout.space
         self.single_action_space = action_space(self.robot)
@@ -120,6 +133,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             for index, scenario in scenarios.items():
                 self.simulation.start(index, scenario)
         self._done[which] = False
+        self._follow()
         return self.simulation.observation.copy(), self._infos(which)
 
     def step(
@@ -147,6 +161,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         if self.autoreset_mode is AutoresetMode.SAME_STEP and done.any():
             final = self._final(done)
             self._restart(done)
+            self._follow()
             return (
                 simulation.observation.copy(),
                 rewards,
@@ -155,6 +170,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
                 {**final, **self._infos(everyone)},
             )
         self._done = done
+        self._follow()
         return (
             simulation.observation.copy(),
             rewards,
@@ -162,6 +178,22 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             truncated,
             self._infos(everyone),
         )
+
+    def render(self) -> tuple[NDArray[np.uint8]] | None:
+        """An image of the robot `render_index` in a tuple, in the mode "rgb_array"; else None."""
+        if self._viewer is None:
+            return None
+        frame = self._viewer.render(self.simulation)
+        return None if frame is None else (frame,)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+
+    def _follow(self) -> None:
+        if self._viewer is not None:
+            self._viewer.follow(self.simulation)
 
     def _restart(self, which: Flags) -> None:
         for index in np.flatnonzero(which).tolist():

@@ -41,8 +41,9 @@ def rollout(env, steps, seed=0, policy_id="sta"):
 
 @pytest.mark.parametrize("id", IDS)
 @pytest.mark.parametrize("check", [check_env, check_env_sb3])
-def test_checkers_have_no_complaint(id, check):
-    env = gym.make(id).unwrapped
+@pytest.mark.parametrize("render_mode", [None, "human", "rgb_array"])
+def test_checkers_have_no_complaint(id, check, render_mode):
+    env = gym.make(id, render_mode=render_mode).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check(env)

@@ -28,6 +28,15 @@ def path(t, speed, sway, frequency, ramp):
 
 
 @compiled
+def path_positions(times, speed, sway, frequency, ramp, positions):
+    """Fill in the reference of the position, m, (k, 2), at times (k,)."""
+    for k in range(times.size):
+        p_x, p_y, _, _, _, _ = path(times[k], speed, sway, frequency, ramp)
+        positions[k, 0] = p_x
+        positions[k, 1] = p_y
+
+
+@compiled
 def filter_coefficients(frequency, step):
     """The critically damped filter x'' = w^2 (target - x) - 2 w x' over one physics step, exactly.
 

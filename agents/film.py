@@ -1,0 +1,176 @@
+"""Policies at work, side by side: as a film in a file or in a window (needs the extra `render`)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import numpy as np
+
+from baselines.contender import Contender
+from usm_gym.evaluation import Trajectory, rollout
+from usm_gym.files import replacing
+from usm_gym.nominal import nominal_of
+from usm_gym.picture import Picture, Recorder
+from usm_gym.rendering import Canvas, Frame, Window, error_scale
+from usm_gym.robot import Robot
+from usm_gym.scenario import Scenario
+from usm_gym.simulation import Simulation
+from usm_gym.validation import in_one_line
+
+# Frames per second of each medium, and how wide a policy's frame is: alone, and beside another.
+# A GIF's times are multiples of 0.01 s, and it grows fast.
+FPS = {".mp4": 25.0, ".gif": 12.5, "window": 50.0}
+WIDTHS = {".mp4": (960, 640), ".gif": (640, 640), "window": (960, 640)}
+# Each frame of a GIF has its own palette, so that a film of any length takes little memory.
+GIF = (
+    "split[a][b];[a]palettegen=stats_mode=single:max_colors=96[p];"
+    "[b][p]paletteuse=new=1:dither=none"
+)
+
+
+@dataclass(frozen=True)
+class Take:
+    """An episode of a policy.
+
+    Attributes:
+        name: The policy's.
+        pictures: One for each frame, or fewer if the robot was lost, the last then showing that.
+        trajectory: The episode.
+    """
+
+    name: str
+    pictures: list[Picture]
+    trajectory: Trajectory
+
+
+def instants(scenario: Scenario, fps: float, speed: float) -> list[int]:
+    """The control instants that the frames of an episode show, played `speed` times real time."""
+    frames = max(1, round(fps * scenario.duration / speed))
+    times = np.arange(frames + 1) * (speed / fps)
+    counts = np.rint(times / scenario.conditions.control_period).astype(int)
+    listed: list[int] = np.minimum(counts, scenario.steps).tolist()
+    return listed
+
+
+def take(
+    contender: Contender,
+    scenario: Scenario,
+    shown: Sequence[int],
+    progress: Callable[[float], None] = lambda episodes: None,
+) -> Take:
+    """Let a policy act in a scenario.
+
+    Args:
+        contender: The policy.
+        scenario: The scenario.
+        shown: The control instants of which pictures are wanted, in order.
+        progress: As of `usm_gym.evaluate`.
+
+    Raises:
+        ValueError: If the policy cannot be made or fails to act.
+    """
+    robot, recorder, wanted = Robot(), Recorder(), set(shown)
+    seen: dict[int, Picture] = {}
+    lost = False
+
+    def watch(simulation: Simulation) -> None:
+        nonlocal lost
+        count = int(simulation.count[0])
+        recorder.note(simulation)
+        if not lost and (count in wanted or simulation.lost[0]):
+            seen[count] = recorder.picture(simulation)
+        lost |= bool(simulation.lost[0])
+
+    policy = contender.make(nominal_of(robot, scenario))
+    try:
+        (trajectory,) = rollout(policy, [scenario], robot, progress, watch)
+    except (Exception, SystemExit) as error:  # whatever a controller may do
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ValueError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
+    end = max(seen)
+    pictures = [seen[count] for count in shown if count < end] + [seen[end]]
+    return Take(contender.name, pictures, trajectory)
+
+
+class Film:
+    """Takes of the same scenario side by side, their errors to the same scale.
+
+    Attributes:
+        size: Width and height of a frame.
+        length: How many frames there are.
+    """
+
+    def __init__(self, takes: Sequence[Take], length: int, width: int) -> None:
+        """Cut a film of `length` frames, each take `width` pixels wide."""
+        self._takes = takes
+        self._canvases = [Canvas(width) for _ in takes]
+        self._scale = max(error_scale(each.pictures[-1].errors) for each in takes)
+        height = self._canvases[0].size[1]
+        self.size = (width * len(takes), height)
+        self.length = length
+
+    def frame(self, index: int) -> Frame:
+        """Draw a frame."""
+        drawn = [
+            canvas.draw(each.pictures[min(index, len(each.pictures) - 1)], each.name, self._scale)
+            for canvas, each in zip(self._canvases, self._takes, strict=True)
+        ]
+        return drawn[0] if len(drawn) == 1 else np.concatenate(drawn, axis=1)
+
+
+def write(
+    film: Film, path: Path, fps: float, progress: Callable[[int], object] = lambda frames: None
+) -> None:
+    """Write a film to an .mp4 or .gif file, in one move.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    options: dict[str, Any]
+    if path.suffix == ".gif":
+        options = {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-vf", GIF]}
+        options |= {"quality": None, "macro_block_size": 1}
+    else:
+        options = {"codec": "libx264", "quality": 6}
+        options |= {"output_params": ["-preset", "veryfast", "-movflags", "+faststart"]}
+    with replacing(path) as part:
+        try:
+            with closing(
+                imageio_ffmpeg.write_frames(
+                    part, film.size, fps=fps, ffmpeg_log_level="quiet", **options
+                )
+            ) as writer:
+                writer.send(None)
+                for index in range(film.length):
+                    writer.send(film.frame(index))
+                    progress(1)
+            # The encoder reports nothing, so that a full disk is found by looking.
+            written, _ = imageio_ffmpeg.count_frames_and_secs(part)
+        except (OSError, RuntimeError) as error:
+            raise OSError(f"cannot write {path}: the encoder stopped; is the disk full?") from error
+        if written != film.length:
+            raise OSError(f"cannot write {path}: {written} of {film.length} frames fit")
+
+
+def play(film: Film, fps: float) -> None:
+    """Show a film in a window, leaving out what comes too late, until its end or a closed window.
+
+    Escape and Q close it, too.
+    """
+    window = Window(film.size, "usm watch")
+    begin = time.perf_counter()
+    try:
+        index = 0
+        while index < film.length and not window.closed:
+            window.show(film.frame(index), fps)
+            index = max(index + 1, round((time.perf_counter() - begin) * fps))
+        if not window.closed:
+            window.show(film.frame(film.length - 1), fps)
+    finally:
+        window.close()

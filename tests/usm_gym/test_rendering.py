@@ -1,0 +1,225 @@
+"""Pictures: what they say of the simulation, what is drawn of them, and what is left behind."""
+
+import dataclasses
+import gc
+import os
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import baselines
+import usm_gym
+from usm_gym import rendering
+from usm_gym.picture import Recorder
+from usm_gym.rendering import HEAD, JET_CORE, REFERENCE, SCENE, TAIL, TRAIL, Canvas
+
+ID = "USM-Operation-v0"
+
+
+def episode(steps, policy="sta", render_mode="rgb_array", scenario="nominal", **arguments):
+    """An environment some steps into an episode, and the true positions on the way."""
+    env = gym.make(ID, render_mode=render_mode, **arguments)
+    observation, _ = env.reset(options={"scenario": scenario})
+    controller, state = baselines.make(policy, env), None
+    positions = [env.unwrapped.simulation.position[0]]
+    for _ in range(steps):
+        action, state = controller.predict(observation, state)
+        observation, *_ = env.step(action)
+        positions.append(env.unwrapped.simulation.position[0])
+    return env, np.array(positions)
+
+
+def places(frame, colour, tolerance=6):
+    """Where in the scene a frame has a colour, (k, 2): columns and rows."""
+    scene = frame[SCENE.top : SCENE.bottom].astype(int)
+    rows, columns = np.nonzero(np.abs(scene - colour).max(axis=2) <= tolerance)
+    return np.stack([columns, rows], axis=1)
+
+
+def test_a_picture_is_the_simulations():
+    env, positions = episode(560)
+    simulation = env.unwrapped.simulation
+    recorder = env.unwrapped._viewer._recorder
+    picture = recorder.picture(simulation)
+    theta = simulation.theta[0]
+    assert picture.time == pytest.approx(11.2)
+    np.testing.assert_allclose(picture.body.centres.mean(axis=0), positions[-1], atol=1e-12)
+    ends = 0.07 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    tips, heels = picture.body.centres + ends, picture.body.centres - ends
+    np.testing.assert_allclose(tips[:-1], heels[1:], atol=1e-12)  # the links hang together
+    np.testing.assert_array_equal(picture.instants, np.arange(561))
+    np.testing.assert_allclose(picture.path[:561] + picture.errors, positions, atol=1e-12)
+    assert picture.max_error.tolist() == simulation.max_error[0].tolist()
+    # The joints bend from 10 s on; the reference posture is where they shall be.
+    reference = picture.reference
+    layout = env.unwrapped.layout
+    wanted = (simulation.observation[0] * layout.scale)[layout.slices["joint_references"]]
+    np.testing.assert_allclose(reference.angles[:-1] - reference.angles[1:], wanted, atol=1e-9)
+    assert reference.angles.mean() == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(reference.centres.mean(axis=0), picture.path[560], atol=1e-12)
+
+
+def test_jets_lag_behind_the_commands_and_blow_against_the_force():
+    env = gym.make(ID, render_mode="rgb_array")
+    env.reset(options={"scenario": "nominal"})
+    assert len(places(env.render(), JET_CORE)) == 0
+    env.step(np.array([0, 1, 0, 0, 0], np.float32))  # to the left: upwards
+    simulation = env.unwrapped.simulation
+    thrust = Recorder().picture(simulation).thrust
+    assert thrust == pytest.approx([0, 1 - np.exp(-0.02 / 0.05), 0, 0, 0], abs=1e-9)
+    frame = env.render()
+    jet = places(frame, JET_CORE)
+    assert len(jet) > 0
+    assert jet[:, 1].min() > places(frame, HEAD)[:, 1].max() - 6  # below the straight body
+    for _ in range(10):
+        env.step(np.array([0, 1, 0, 0, 0], np.float32))
+    assert len(places(env.render(), JET_CORE)) > 2 * len(jet)
+
+
+def test_the_frame_shows_the_robot():
+    env, _ = episode(620)
+    frame = env.render()
+    assert frame.shape == (480, 640, 3)
+    assert frame.dtype == np.uint8
+    head, tail = places(frame, HEAD), places(frame, TAIL)
+    assert len(head) > 100
+    assert len(tail) > 100
+    assert head[:, 0].mean() - tail[:, 0].mean() > 300
+    assert len(places(frame, TRAIL)) > 10
+    assert len(places(frame, REFERENCE)) > 10  # the body lags behind the reference
+    env.step(np.zeros(5, np.float32))
+    assert (env.render() != frame).any()
+
+
+@pytest.mark.parametrize("width", [320, 640, 960])
+def test_frames_have_any_width(width):
+    env, _ = episode(3)
+    canvas = Canvas(width)
+    frame = canvas.draw(Recorder().picture(env.unwrapped.simulation), "sta")
+    assert frame.shape == (width * 3 // 4, width, 3)
+
+
+def test_the_scale_of_the_error_is_round_and_large_enough():
+    for largest, scale in ((0.0, 1e-4), (0.0019, 2e-3), (0.002, 5e-3), (0.3, 0.5), (40.0, 5.0)):
+        assert rendering.error_scale(np.array([[0.0, -largest]])) == pytest.approx(scale)
+
+
+def test_rendering_does_not_touch_the_physics():
+    plain, rendered = gym.make(ID), gym.make(ID, render_mode="rgb_array")
+    for env in (plain, rendered):
+        env.reset(seed=3)
+    for action in np.random.default_rng(0).uniform(-1, 1, (20, 5)).astype(np.float32):
+        before, *_ = plain.step(action)
+        after, *_ = rendered.step(action)
+        rendered.render()
+        assert (before == after).all()
+
+
+def test_a_robot_that_is_lost_is_drawn():
+    for conditions in ({"integrator": "explicit"}, "field"):  # not finite; half a metre away
+        env = gym.make(ID, render_mode="rgb_array", conditions=conditions)
+        env.reset(seed=0)
+        terminated = False
+        while not terminated:
+            *_, terminated, _, _ = env.step(np.ones(5, np.float32))
+        picture = Recorder().picture(env.unwrapped.simulation)
+        assert picture.lost
+        assert all(np.isfinite(each).all() for each in (picture.body.centres, picture.errors))
+        assert env.render().shape == (480, 640, 3)
+
+
+def test_a_restored_episode_has_no_trail_that_it_was_not_seen_to_leave():
+    env, _ = episode(40)
+    snapshot = env.unwrapped.snapshot()
+    other, _ = episode(2)
+    other.unwrapped.restore(snapshot)
+    picture = other.unwrapped._viewer._recorder.picture(other.unwrapped.simulation)
+    assert picture.instants.tolist() == [40]
+    assert other.render().shape == (480, 640, 3)
+
+
+def test_a_vector_environment_shows_the_chosen_robot():
+    envs = gym.make_vec(
+        ID,
+        num_envs=3,
+        vectorization_mode="vector_entry_point",
+        render_mode="rgb_array",
+        render_index=2,
+    )
+    single = gym.make(ID, render_mode="rgb_array")
+    envs.reset(seed=[5, 6, 7])
+    single.reset(seed=7)
+    for action in np.random.default_rng(1).uniform(-1, 1, (30, 3, 5)).astype(np.float32):
+        envs.step(action)
+        single.step(action[2])
+    (frame,) = envs.render()
+    assert (frame == single.render()).all()
+    envs.close()
+    with pytest.raises(ValueError, match="render_index is 3; allowed: 0 to 2"):
+        usm_gym.vector_env.USMVectorEnv(3, "operation", render_index=3)
+
+
+def test_an_episode_after_another_starts_a_trail_of_its_own():
+    scenario = dataclasses.replace(usm_gym.suite("operation")[0], duration=0.2, settle_time=0.1)
+    envs = gym.make_vec(
+        ID, num_envs=1, vectorization_mode="vector_entry_point", render_mode="rgb_array"
+    )
+    envs.reset(options={"scenario": scenario})
+    for _ in range(13):  # ten steps, the reset, two steps
+        envs.step(np.zeros((1, 5), np.float32))
+    picture = envs._viewer._recorder.picture(envs.simulation)
+    assert picture.instants.tolist() == [0, 1, 2]
+
+
+def test_the_frame_rate_is_the_control_rate():
+    assert gym.make(ID).metadata["render_fps"] == 50
+    slow = gym.make(ID, conditions={"control_period": 0.04})
+    assert slow.unwrapped.metadata["render_fps"] == 25
+
+
+def test_a_window_that_is_closed_by_hand_ends_nothing():
+    import pygame
+
+    env, _ = episode(2, render_mode="human")
+    assert env.render() is None
+    (window,) = rendering._windows
+    pygame.event.post(pygame.Event(pygame.WINDOWCLOSE, window=window))
+    env.step(np.zeros(5, np.float32))
+    assert not rendering._windows
+    env.step(np.zeros(5, np.float32))
+    env.close()
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="no /proc")
+@pytest.mark.parametrize("render_mode", ["human", "rgb_array"])
+def test_a_hundred_environments_leave_nothing_behind(render_mode):
+    def left():
+        gc.collect()
+        return len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))
+
+    def use():
+        env = gym.make(ID, render_mode=render_mode)
+        env.reset(options={"scenario": "nominal"})
+        env.render()
+        env.close()
+        env.close()
+
+    use()  # loads libraries once
+    before = left()
+    for _ in range(100):
+        use()
+    assert left() == before
+    assert not rendering._windows
+
+
+def test_without_pygame_one_line_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    monkeypatch.delitem(sys.modules, "usm_gym.rendering")
+    with pytest.raises(gym.error.DependencyNotInstalled) as caught:
+        gym.make(ID, render_mode="rgb_array")
+    assert str(caught.value) == (
+        "render_mode='rgb_array' needs pygame: pip install 'usm-gym[render]'"
+    )
+    gym.make(ID).reset(seed=0)
