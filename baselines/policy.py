@@ -213,6 +213,10 @@ class ScriptedPolicy:
         """
         raise NotImplementedError
 
+    def law_state(self, state: Array) -> Array:
+        """The law's own part of the state that `predict` returns, (batch, *law_shape)."""
+        return state[:, 1 + 2 * self._thrusters :].reshape(len(state), *self.law_shape)
+
     def predict(
         self,
         observation: ArrayLike,
@@ -255,7 +259,7 @@ class ScriptedPolicy:
         allocation = np.empty((size, 3, thrusters))
         signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
         sense(state, self._model, signals)
-        law_state = state[:, 1 + 2 * thrusters :].reshape(size, *self.law_shape)
+        law_state = self.law_state(state)
         force = self.force(signals, law_state)
         # Where the reshape had to copy, the advanced state has to be written back.
         state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)

@@ -23,14 +23,14 @@ def check_writable(path: str | Path) -> None:
         raise type(error)(f"cannot write {target}: {error.strerror}") from error
 
 
-def write_text(path: str | Path, text: str) -> None:
+def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file in one move: readers, and an interruption, see the old or the new one."""
     target = Path(path)
     with tempfile.NamedTemporaryFile(
-        "w", dir=target.parent, prefix=target.name, suffix=".part", delete=False, encoding="utf-8"
+        dir=target.parent, prefix=target.name, suffix=".part", delete=False
     ) as part:
         try:
-            part.write(text)
+            part.write(data)
             part.flush()
             os.fsync(part.fileno())
             os.chmod(part.name, 0o666 & ~_umask())
@@ -38,6 +38,11 @@ def write_text(path: str | Path, text: str) -> None:
         except BaseException:
             os.unlink(part.name)
             raise
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write text in one move, as `write_bytes` does."""
+    write_bytes(path, text.encode())
 
 
 def write_json(path: str | Path, data: Any) -> None:
