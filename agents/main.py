@@ -16,13 +16,25 @@ from agents.commands import (
     policies,
     reproduce,
     robustness,
+    train,
     tune,
     watch,
 )
 from agents.terminal import Parser
 from usm_gym.validation import in_one_line
 
-COMMANDS = (policies, evaluate, compare, leaderboard, robustness, tune, watch, reproduce, bench)
+COMMANDS = (
+    policies,
+    evaluate,
+    compare,
+    leaderboard,
+    robustness,
+    tune,
+    train,
+    watch,
+    reproduce,
+    bench,
+)
 
 DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
@@ -35,6 +47,7 @@ A first look, in half a minute:
   usm robustness --vary noise  how they fare when something gets worse
   usm watch                    one of them at work
   usm tune POLICY              better gains for one of them
+  usm train --output DIR       an agent that adds thrust to one of them
   usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here
 """

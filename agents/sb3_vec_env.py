@@ -13,35 +13,49 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
+from agents.residual import ResidualVectorEnv
 from usm_gym.validation import require
 from usm_gym.vector_env import USMVectorEnv
 
 
 class SB3VecEnv(VecEnv):
-    """The robots of a `USMVectorEnv` as Stable-Baselines3 wants them.
+    """The robots of a `USMVectorEnv`, or of the residual task on one, as Stable-Baselines3 wants.
 
     Episodes restart within the step that ends them. The info of a step that ends an episode has
     everything: the environment's own keys, `terminal_observation`, `TimeLimit.truncated`, and
     `episode` with return `r`, length `l` and wall time `t` as `Monitor` gives them; other infos are
     empty, which is what keeps hundreds of robots fast. All robots share one environment, whose
-    attributes and methods `get_attr`, `set_attr` and `env_method` reach.
+    attributes and methods `get_attr`, `set_attr` and `env_method` reach, beneath the residual task.
     """
 
-    def __init__(self, envs: gym.vector.VectorEnv[Any, Any, Any]) -> None:
+    def __init__(
+        self, envs: gym.vector.VectorEnv[Any, Any, Any], reward_scale: float = 1.0
+    ) -> None:
         """Take a vector environment made with `autoreset_mode="SameStep"`.
+
+        Args:
+            envs: The environment.
+            reward_scale: Factor on the rewards of steps; the returns in infos are left as they are.
 
         Raises:
             ValueError: If it is none of this package, or restarts episodes otherwise.
         """
-        require(isinstance(envs, USMVectorEnv), "envs", envs, "a USMVectorEnv, not wrapped")
-        assert isinstance(envs, USMVectorEnv)
+        plain = envs.unwrapped
         require(
-            envs.autoreset_mode is AutoresetMode.SAME_STEP,
+            isinstance(plain, USMVectorEnv) and isinstance(envs, (USMVectorEnv, ResidualVectorEnv)),
+            "envs",
+            envs,
+            "a USMVectorEnv, or a ResidualVectorEnv around one",
+        )
+        assert isinstance(plain, USMVectorEnv)
+        require(
+            plain.autoreset_mode is AutoresetMode.SAME_STEP,
             "autoreset_mode",
-            envs.autoreset_mode.value,
+            plain.autoreset_mode.value,
             f"{AutoresetMode.SAME_STEP.value!r}",
         )
-        self._envs = envs
+        self._envs: Any = envs
+        self._reward_scale = reward_scale
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
         self._begin = time.time()
         self._returns = np.zeros(self.num_envs)
@@ -57,7 +71,7 @@ class SB3VecEnv(VecEnv):
         self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
-        return observations
+        return np.asarray(observations)
 
     def step_async(self, actions: np.ndarray[Any, Any]) -> None:
         """Keep the actions for `step_wait`."""
@@ -85,7 +99,17 @@ class SB3VecEnv(VecEnv):
             }
         self._returns[done] = 0.0
         self._lengths[done] = 0
-        return observations, rewards.astype(np.float32), done, each
+        return observations, (self._reward_scale * rewards).astype(np.float32), done, each
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Copy the whole state."""
+        return self._envs.snapshot(), self._returns.copy(), self._lengths.copy()
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
+        """Return to a snapshot."""
+        envs, returns, lengths = snapshot
+        self._envs.restore(envs)
+        self._returns[:], self._lengths[:] = returns, lengths
 
     def close(self) -> None:
         """Close the environment."""
@@ -93,14 +117,14 @@ class SB3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """The environment's attribute, once for each robot asked for."""
-        return [getattr(self._envs, attr_name) for _ in self._get_indices(indices)]
+        return [getattr(self._envs.unwrapped, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set the environment's attribute, which all robots share."""
         require(
             len(list(self._get_indices(indices))) == self.num_envs, "indices", indices, "all robots"
         )
-        setattr(self._envs, attr_name, value)
+        setattr(self._envs.unwrapped, attr_name, value)
 
     def env_method(
         self,
@@ -110,7 +134,7 @@ class SB3VecEnv(VecEnv):
         **method_kwargs: Any,
     ) -> list[Any]:
         """Call the environment's method once; its answer, once for each robot asked for."""
-        answer = getattr(self._envs, method_name)(*method_args, **method_kwargs)
+        answer = getattr(self._envs.unwrapped, method_name)(*method_args, **method_kwargs)
         return [answer for _ in self._get_indices(indices)]
 
     def env_is_wrapped(

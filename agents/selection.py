@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from agents.artifact import agent_contender
 from agents.options import add_computing, computing, count, parse_conditions
 from agents.terminal import progress_bar
 from baselines.contender import Contender, contender
@@ -23,8 +24,9 @@ from usm_gym.validation import in_one_line, require
 
 POLICIES = """\
 policies:
-  an id (usm policies), ID@gains.json with gains from `usm tune`, or my_module:MyController, a class
-  or factory of your own with Stable-Baselines3's predict (docs/own_controller.md)
+  an id (usm policies), ID@gains.json with gains from `usm tune`, the folder of an agent from
+  `usm train`, or my_module:MyController, a class or factory of your own with Stable-Baselines3's
+  predict (docs/own_controller.md)
 """
 
 
@@ -76,7 +78,17 @@ def chosen_contenders(names: str | None) -> list[Contender]:
     else:
         chosen = [name.strip() for name in names.split(",") if name.strip()]
     require(len(chosen) > 0, "--policies", names, "one name or more")
-    return [contender(name) for name in dict.fromkeys(chosen)]
+    return [named(name) for name in dict.fromkeys(chosen)]
+
+
+def named(name: str) -> Contender:
+    """The policy of a name as `--policies` takes it; the folder of an agent is one, too.
+
+    Raises:
+        ValueError: If there is none.
+        OSError: If a file cannot be read.
+    """
+    return agent_contender(name) if Path(name).is_dir() else contender(name)
 
 
 def sampled(arguments: argparse.Namespace) -> bool:

@@ -153,3 +153,32 @@ def correct(correction, y, state):
     innovation = y - state[ERROR]
     for i in range(3):
         state[i] += correction[i] * innovation
+
+
+@piece
+def estimate(signals, mass, model, b, axis, state):
+    """One period of the filter on what was measured of robot b and applied to it, in place.
+
+    Args:
+        signals: `baselines.policy.Signals`.
+        mass: Total mass m_t, kg.
+        model: `Linear`.
+        b: Which robot.
+        axis: Which axis.
+        state: Its (e, v, d, f).
+
+    Returns:
+        Last command over the inertia and known acceleration, m/s^2, and the innovation, m.
+    """
+    y, acceleration = signals.y[b, axis], signals.acceleration[b, axis]
+    velocity = signals.velocity[b, axis]
+    last = (signals.u[b, axis] + acceleration) * mass / model.inertia[axis]
+    known = -acceleration - model.damping[axis] * velocity
+    innovation = 0.0
+    if signals.started[b] == 0.0:
+        start(y, velocity, state)
+    else:
+        predict(model.transition[axis], last, known, state)
+        innovation = y - state[ERROR]
+        correct(model.correction[axis], y, state)
+    return last, known, innovation

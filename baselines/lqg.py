@@ -112,18 +112,10 @@ def lqg(signals, mass, model, gain, state, force):
     """Filter and regulator for a batch, both axes; fills in the force, (batch, 2)."""
     for b in range(force.shape[0]):
         for axis in range(2):
-            own, y = state[b, axis], signals.y[b, axis]
-            acceleration, velocity = signals.acceleration[b, axis], signals.velocity[b, axis]
-            inertia = model.inertia[axis]
-            last = (signals.u[b, axis] + acceleration) * mass / inertia
-            known = -acceleration - model.damping[axis] * velocity
-            if signals.started[b] == 0.0:
-                kalman.start(y, velocity, own)
-            else:
-                kalman.predict(model.transition[axis], last, known, own)
-                kalman.correct(model.correction[axis], y, own)
+            own = state[b, axis]
+            last, known, _ = kalman.estimate(signals, mass, model, b, axis, own)
             steady = -(own[DISTURBANCE] + known)
-            force[b, axis] = inertia * regulate(gain[axis], steady, last, own)
+            force[b, axis] = model.inertia[axis] * regulate(gain[axis], steady, last, own)
 
 
 @compiled

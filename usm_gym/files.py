@@ -47,10 +47,15 @@ def replacing(path: str | Path) -> Iterator[Path]:
         raise
 
 
-def write_text(path: str | Path, text: str) -> None:
-    """Write a text file in one move."""
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write a file in one move."""
     with replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(data)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write text in one move, as `write_bytes` does."""
+    write_bytes(path, text.encode())
 
 
 def write_json(path: str | Path, data: Any) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,8 +35,69 @@ class Entry:
     meaning: str
 
 
+class Layout(ABC):
+    """A table of entries, and what follows from it."""
+
+    @property
+    @abstractmethod
+    def entries(self) -> tuple[Entry, ...]:
+        """All entries in order."""
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """Index of the first number of each entry, and the size of the whole, int64."""
+        sizes = [entry.size for entry in self.entries]
+        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+    @property
+    def size(self) -> int:
+        """How many numbers an observation has."""
+        return int(self.starts[-1])
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each entry stands, by name."""
+        return {
+            entry.name: slice(int(start), int(start) + entry.size)
+            for entry, start in zip(self.entries, self.starts, strict=False)
+        }
+
+    @cached_property
+    def scale(self) -> NDArray[np.float64]:
+        """Physical value = observation * scale, shape (size,)."""
+        return np.concatenate([np.full(entry.size, entry.scale) for entry in self.entries])
+
+    @cached_property
+    def bound(self) -> NDArray[np.float32]:
+        """Bound of each number of the observation, as it is returned, shape (size,), float32."""
+        bounds = [np.full(entry.size, entry.bound / entry.scale) for entry in self.entries]
+        return np.concatenate(bounds).astype(np.float32)
+
+    @property
+    def space(self) -> gym.Space[NDArray[np.float32]]:
+        """The observation space."""
+        return gym.spaces.Box(-self.bound, self.bound, dtype=np.float32)
+
+    @property
+    def fingerprint(self) -> str:
+        """A hash of the whole table, by which agents know the layout they were trained on."""
+        return hashlib.sha256(self.table().encode()).hexdigest()[:16]
+
+    def table(self) -> str:
+        """The table in Markdown, as the environments' documentation shows it."""
+        lines = ["| index | entry | unit | scale | bound | meaning |", "|---|---|---|---|---|---|"]
+        for entry in self.entries:
+            part = self.slices[entry.name]
+            index = str(part.start) if entry.size == 1 else f"{part.start}-{part.stop - 1}"
+            lines.append(
+                f"| {index} | `{entry.name}` | {entry.unit} | {entry.scale:g} | "
+                f"{entry.bound:g} | {entry.meaning} |"
+            )
+        return "\n".join(lines)
+
+
 @dataclass(frozen=True)
-class ObservationLayout:
+class ObservationLayout(Layout):
     """The layout of the observation of a robot, the same in both modes.
 
     Attributes:
@@ -101,50 +164,3 @@ class ObservationLayout:
         )
         assert tuple(entry.name for entry in table) == ENTRIES
         return table
-
-    @cached_property
-    def starts(self) -> NDArray[np.int64]:
-        """Index of the first number of each entry, and the size of the whole, int64."""
-        sizes = [entry.size for entry in self.entries]
-        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-
-    @property
-    def size(self) -> int:
-        """How many numbers an observation has."""
-        return int(self.starts[-1])
-
-    @cached_property
-    def slices(self) -> dict[str, slice]:
-        """Where each entry stands, by name."""
-        return {
-            entry.name: slice(int(start), int(start) + entry.size)
-            for entry, start in zip(self.entries, self.starts, strict=False)
-        }
-
-    @cached_property
-    def scale(self) -> NDArray[np.float64]:
-        """Physical value = observation * scale, shape (size,)."""
-        return np.concatenate([np.full(entry.size, entry.scale) for entry in self.entries])
-
-    @cached_property
-    def bound(self) -> NDArray[np.float32]:
-        """Bound of each number of the observation, as it is returned, shape (size,), float32."""
-        bounds = [np.full(entry.size, entry.bound / entry.scale) for entry in self.entries]
-        return np.concatenate(bounds).astype(np.float32)
-
-    @property
-    def space(self) -> gym.Space[NDArray[np.float32]]:
-        """The observation space."""
-        return gym.spaces.Box(-self.bound, self.bound, dtype=np.float32)
-
-    def table(self) -> str:
-        """The table in Markdown, as the environments' documentation shows it."""
-        lines = ["| index | entry | unit | scale | bound | meaning |", "|---|---|---|---|---|---|"]
-        for entry in self.entries:
-            part = self.slices[entry.name]
-            index = str(part.start) if entry.size == 1 else f"{part.start}-{part.stop - 1}"
-            lines.append(
-                f"| {index} | `{entry.name}` | {entry.unit} | {entry.scale:g} | "
-                f"{entry.bound:g} | {entry.meaning} |"
-            )
-        return "\n".join(lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -17,12 +18,27 @@ from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot, robot_of
 from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named
-from usm_gym.simulation import Simulation
+from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.validation import require
 from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class VectorSnapshot:
+    """A copy of everything that changes in a vector environment.
+
+    Attributes:
+        simulation: The robots.
+        streams: States of the streams from which each robot's scenarios are drawn.
+        done: Which episodes have ended and wait for their reset.
+    """
+
+    simulation: Snapshot
+    streams: tuple[Any, ...]
+    done: Flags
 
 
 class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any]):
@@ -178,6 +194,20 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             truncated,
             self._infos(everyone),
         )
+
+    def snapshot(self) -> VectorSnapshot:
+        """Copy the whole state, the streams from which scenarios are drawn included."""
+        streams = tuple(stream.bit_generator.state for stream in self._streams)
+        return VectorSnapshot(self.simulation.snapshot(), streams, self._done.copy())
+
+    def restore(self, snapshot: VectorSnapshot) -> None:
+        """Return to a snapshot; equal actions then have equal consequences, to the bit."""
+        self._simulation = Simulation(self.robot, snapshot.simulation.scenarios, self.threads)
+        self._simulation.restore(snapshot.simulation)
+        self._streams = [seeding.np_random(0)[0] for _ in snapshot.streams]
+        for stream, state in zip(self._streams, snapshot.streams, strict=True):
+            stream.bit_generator.state = state
+        self._done = snapshot.done.copy()
 
     def render(self) -> tuple[NDArray[np.uint8]] | None:
         """An image of the robot `render_index` in a tuple, in the mode "rgb_array"; else None."""

@@ -15,12 +15,12 @@ from agents.selection import (
     add_scoring,
     chosen_scenarios,
     leave_if_refused,
+    named,
     scored,
     seeds,
     tasks,
 )
 from agents.terminal import mm, output_console
-from baselines.contender import contender
 from baselines.scoring import Refusal
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
         require(not given, " ".join(given), names, "policies only: a file has its own scenarios")
         scenarios, *others = [each.scenarios for each in files.values()]
         require(all(other == scenarios for other in others), "B", names[1], "the scenarios of A")
-    missing = [contender(name) for name in names if name not in files]
+    missing = [named(name) for name in names if name not in files]
     chosen = tasks(missing, scenarios, arguments.time_limit) if missing else []
     scores: dict[str, Scores] = {name: each.scores for name, each in files.items()}
     refused = {}

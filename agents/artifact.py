@@ -1,0 +1,165 @@
+"""Files of trained agents: a folder with `agent.json` and `policy.safetensors`.
+
+Neither can hold code, so that loading an agent from anywhere runs nothing of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from agents.network import Activation, Network, Output
+from agents.residual import ActionKind, Residual, ResidualPolicy
+from baselines.contender import Contender, fingerprint
+from baselines.policy import Policy
+from baselines.registry import make, register
+from usm_gym.files import write_bytes, write_json
+from usm_gym.nominal import Nominal
+from usm_gym.scenario import Mode
+from usm_gym.validation import CONFIG, Count, Number, Positive, in_one_line, require
+
+DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
+PRETRAINED = Path(__file__).with_name("pretrained")
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Agent:
+    """What `agent.json` says.
+
+    Attributes:
+        summary: What it is, in a line.
+        mode: "operation" or "torpedo".
+        conditions: Under which it was trained.
+        base: Id of the base policy.
+        gains: All gains of the base, by name.
+        residual_scale: Largest residual, N and N m.
+        action: What the action is.
+        layout: Fingerprint of the observation's layout.
+        activation: Of the hidden layers.
+        output: Of the last layer.
+        weights: SHA-256 of the file of weights.
+        algorithm: By which it was trained.
+        seed: Seed of the training.
+        steps: After how many steps.
+        training: Settings, versions and the command of the training.
+        scores: Scores, each with where it comes from.
+    """
+
+    summary: str
+    mode: Mode
+    conditions: dict[str, Any]
+    base: str
+    gains: dict[str, Number]
+    residual_scale: Positive
+    action: ActionKind
+    layout: str
+    activation: Activation
+    output: Output
+    weights: str
+    algorithm: str
+    seed: int
+    steps: Count
+    training: dict[str, Any]
+    scores: dict[str, Any]
+
+
+_ADAPTER = TypeAdapter(Agent)
+
+
+def write_agent(folder: Path, description: Mapping[str, Any], network: Network) -> None:
+    """Write an agent; `description` has the fields of `Agent`, less those of the network."""
+    arrays: dict[str, NDArray[np.float32]] = {}
+    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        arrays[f"weight_{k}"], arrays[f"bias_{k}"] = weight, bias
+    data = save(arrays)
+    agent = Agent(
+        **description,
+        activation=network.activation,
+        output=network.output,
+        weights=hashlib.sha256(data).hexdigest(),
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    write_bytes(folder / WEIGHTS, data)
+    write_json(folder / DESCRIPTION, _ADAPTER.dump_python(agent, mode="json"))
+
+
+def read_agent(folder: Path) -> tuple[Agent, Network]:
+    """Read an agent; nothing of it is run.
+
+    Raises:
+        ValueError: If the folder holds no agent, or one that was changed or cut short.
+        OSError: If it cannot be read.
+    """
+    text, data = (folder / DESCRIPTION).read_bytes(), (folder / WEIGHTS).read_bytes()
+    try:
+        agent = _ADAPTER.validate_python(json.loads(text))
+    except ValueError as error:
+        raise ValueError(f"{folder / DESCRIPTION} is no agent: {in_one_line(error)}") from error
+    found = hashlib.sha256(data).hexdigest()
+    require(found == agent.weights, f"SHA-256 of {folder / WEIGHTS}", found, agent.weights)
+    try:
+        arrays = load(data)
+        count = len(arrays) // 2
+        return agent, Network(
+            tuple(arrays[f"weight_{k}"] for k in range(count)),
+            tuple(arrays[f"bias_{k}"] for k in range(count)),
+            agent.activation,
+            agent.output,
+        )
+    except (SafetensorError, KeyError, ValueError) as error:
+        raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
+
+
+def make_agent(nominal: Nominal, folder: str) -> Policy:
+    """Make the policy of an agent's folder.
+
+    Raises:
+        ValueError: If it cannot be read, or its observation is no longer laid out as in training.
+        OSError: If it cannot be read.
+    """
+    agent, network = read_agent(Path(folder))
+    base = make(agent.base, nominal, **agent.gains)
+    residual = Residual(nominal, base, agent.residual_scale, agent.action)
+    require(
+        agent.layout == residual.layout.fingerprint,
+        f"observation layout of {folder}",
+        agent.layout,
+        f"{residual.layout.fingerprint}, that of this version",
+    )
+    sizes = (network.inputs, network.outputs)
+    fitting = (residual.layout.size, residual.actions)
+    require(sizes == fitting, f"inputs and outputs of {folder}", sizes, str(fitting))
+    return ResidualPolicy(residual, network)
+
+
+def agent_contender(folder: str) -> Contender:
+    """The agent of a folder as a contender.
+
+    Raises:
+        ValueError: If the folder holds no agent.
+        OSError: If it cannot be read.
+    """
+    agent, _ = read_agent(Path(folder))
+    sources = fingerprint("usm_gym", "baselines", "agents")
+    description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
+    identity = json.dumps([agent.weights, description, sources])
+    return Contender(folder, partial(make_agent, folder=folder), identity=identity)
+
+
+def register_shipped() -> None:
+    """Register the shipped agents under the names of their folders."""
+    for description in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}")):
+        folder = description.parent
+        summary = json.loads(description.read_text(encoding="utf-8"))["summary"]
+        register(folder.name, partial(make_agent, folder=str(folder)), summary)

@@ -1,0 +1,94 @@
+"""`usm train`: train an agent on the residual task."""
+
+from __future__ import annotations
+
+import argparse
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from agents.options import parse_conditions
+from agents.terminal import mm, output_console, progress_bar
+from usm_gym.validation import require
+
+DESCRIPTION = """\
+Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
+--policies takes, its learning curve on held-out scenarios of the training distribution, TensorBoard
+logs where TensorBoard is installed, and the last checkpoint. Frozen suites are never seen. The same
+command with --resume goes on from the last checkpoint. Needs the extra `agents`.
+"""
+EXAMPLES = """\
+examples:
+  usm train --output mine                             PPO on the paper's controller
+  usm train --algorithm tqc --base pd --output mine   another algorithm on another base
+  usm train --resume --output mine                    go on after an interruption
+  usm evaluate --policies sta,mine                    what it has gained
+"""
+# Options that make the plan, by the names of its fields.
+OPTIONS = (
+    ("algorithm", str, "A", "ppo, sac, td3 or tqc (default: ppo)"),
+    ("env", str, "ID", "residual task (default: agents:USM-OperationResidual-v0)"),
+    ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
+    ("residual_scale", float, "N", "largest residual, N and N m (default: 6)"),
+    ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
+    ("seed", int, "S", "seed of everything random (default: 0)"),
+    ("steps", int, "N", "steps of all robots together (default: 3000000)"),
+    ("interval", int, "N", "steps between checkpoints (default: 250000)"),
+)
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "train",
+        help="train an agent",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    for name, kind, metavar, text in OPTIONS:
+        add(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
+    add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
+    add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
+    add("--resume", action="store_true", help="go on from the last checkpoint in that folder")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train, with a progress bar, and say what came of it."""
+    folder = Path(arguments.output)
+    require(
+        find_spec("sb3_contrib") is not None,
+        "usm train",
+        arguments.output,
+        "nothing, until Stable-Baselines3 is installed (the extra `agents`)",
+    )
+    from agents.training import PLAN, Plan, read_plan, train
+
+    names = [name for name, *_ in OPTIONS] + ["conditions"]
+    given = {name: getattr(arguments, name) for name in names}
+    given = {name: value for name, value in given.items() if value is not None}
+    if "conditions" in given:
+        given["conditions"] = parse_conditions(given["conditions"])
+    if arguments.resume:
+        require(not given, "--resume", ", ".join(given), "--output alone; the rest is kept there")
+        plan = read_plan(folder)
+    else:
+        fresh = not (folder / PLAN).exists()
+        require(fresh, "--output", str(folder), "a folder without a training, or --resume")
+        plan = Plan(**given)
+    with progress_bar() as bar:
+        line = bar.add_task("", total=plan.steps)
+
+        def show(steps: int, validation: str) -> None:
+            bar.update(line, completed=steps, description=validation)
+
+        curve = train(plan, folder, show)
+    best = min(curve, key=lambda point: point["max_error_x"] + point["max_error_y"])
+    console = output_console()
+    for name, point in (("before", curve[0]), ("best", best), ("last", curve[-1])):
+        console.print(
+            f"{name}: {mm(point['max_error_x'])} / {mm(point['max_error_y'])} mm "
+            f"after {point['steps']} steps, {point['seconds']:.0f} s",
+        )

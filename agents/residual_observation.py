@@ -1,0 +1,170 @@
+"""What the agent of the residual task sees: the table, and the numbers from which it is filled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.estimator import Estimator
+from baselines.lqg import LQG
+from baselines.pd import PD
+from baselines.policy import Policy, ScriptedPolicy, Signals
+from baselines.super_twisting import SuperTwisting
+from usm_gym.observation import Entry, Layout, ObservationLayout
+
+Array = NDArray[np.float64]
+
+_RATE = Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer")
+_DISTURBANCE = Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same")
+_INTEGRAL = Entry("base_integral", 2, "m/s^2", 2.0, 40.0, "v of the super-twisting law (11)")
+_ADAPTED = Entry("base_alpha", 2, "m^(1/2)/s^(3/2)", 50.0, 500.0, "alpha of the same")
+# The numbers of a law's state that the agent sees, by their index in each axis. Of a base that is
+# not listed it sees the command alone.
+BASE_STATES: dict[type, dict[int, Entry]] = {
+    SuperTwisting: {1: _RATE, 2: _DISTURBANCE, 4: _INTEGRAL, 5: _ADAPTED},
+    PD: {1: _RATE, 2: _DISTURBANCE},
+    LQG: {1: _RATE, 2: _DISTURBANCE},
+}
+
+
+@dataclass(frozen=True)
+class ResidualLayout(Layout):
+    """The layout of the residual task's observation; values beyond a bound are cut off at it.
+
+    Attributes:
+        thrusters: Number of thrusters.
+        actions: Number of numbers in an action.
+        base: Entries of the base's own state.
+    """
+
+    thrusters: int
+    actions: int
+    base: tuple[Entry, ...]
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """All entries in order."""
+        return (
+            Entry("position_error", 2, "m", 0.002, 0.02, "as measured (x, y)"),
+            Entry("reference_velocity", 2, "m/s", 0.1, 1.0, "velocity of the reference (x, y)"),
+            Entry("reference_acceleration", 2, "m/s^2", 0.02, 0.2, "its acceleration"),
+            Entry("estimated_error", 2, "m", 0.002, 0.02, "error, by the Kalman filter"),
+            Entry("estimated_rate", 2, "m/s", 0.04, 0.4, "its rate, by the same"),
+            Entry("estimated_disturbance", 2, "m/s^2", 0.2, 4.0, "disturbance, by the same"),
+            Entry("estimated_thrust", 2, "m/s^2", 1.0, 20.0, "thrust over inertia, by the same"),
+            Entry("innovation", 2, "m", 2e-4, 4e-3, "measurement less its prediction, by the same"),
+            *self.base,
+            Entry("base_force", 2, "N", 40.0, 400.0, "the base's force, before saturation"),
+            Entry("base_moment", 1, "N m", 5.0, 100.0, "the base's moment, before saturation"),
+            Entry(
+                "thruster_command",
+                self.thrusters,
+                "1",
+                1.0,
+                1.1,
+                "last command over the limit, after saturation",
+            ),
+            Entry("last_action", self.actions, "1", 1.0, 1.0, "the agent's last action"),
+            Entry("heading", 1, "rad", 0.5, 10.0, "mean link angle, never wrapped"),
+            Entry("heading_error", 1, "rad", 0.1, 1.0, "heading less its reference"),
+            Entry("heading_rate", 1, "rad/s", 0.2, 4.0, "rate of the heading"),
+            Entry("deflection", 1, "rad", 1.0, 10.0, "sum of the joint angles"),
+            Entry("deflection_rate", 1, "rad/s", 2.0, 40.0, "its rate"),
+            Entry("reference_deflection", 1, "rad", 1.0, 10.0, "sum of the joint references"),
+            Entry("reference_deflection_rate", 1, "rad/s", 2.0, 40.0, "its rate"),
+            Entry(
+                "reference_deflection_acceleration", 1, "rad/s^2", 50.0, 1000.0, "its acceleration"
+            ),
+            Entry("bending_joints", 1, "1", 10.0, 100.0, "how many joints are asked to bend"),
+        )
+
+
+class ResidualObserver:
+    """Makes the agent's observation from the plain one, for a batch.
+
+    Attributes:
+        layout: The table.
+    """
+
+    def __init__(
+        self, base: Policy, plain: ObservationLayout, actions: int, estimator: Estimator
+    ) -> None:
+        """Take the base, whose state is shown, and the layout of the plain observation."""
+        self._base, self._plain, self._estimator = base, plain, estimator
+        self._shown = BASE_STATES.get(type(base), {})
+        self.layout = ResidualLayout(plain.thrusters, actions, tuple(self._shown.values()))
+
+    def update(
+        self,
+        observation: NDArray[np.float32],
+        base_action: NDArray[np.float32],
+        base_state: Any,
+        last_action: NDArray[np.float32],
+        state: Array | None,
+        start: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.float32], Signals, Array]:
+        """Take in a batch of observations.
+
+        Args:
+            observation: Plain observations, (batch, numbers).
+            base_action: The base's commands over the limit, not clipped, (batch, thrusters).
+            base_state: The base's state after that.
+            last_action: The agent's last action, zero at the start, (batch, actions).
+            state: What the last call returned; None at the start.
+            start: Where an episode starts, (batch,).
+
+        Returns:
+            The agent's observations, (batch, layout.size); what was measured; and the state for the
+            next call.
+        """
+        signals, estimates, innovation, state = self._estimator.update(observation, state, start)
+        value = self._values(observation)
+        shown: list[Array] = []
+        if self._shown:
+            assert isinstance(self._base, ScriptedPolicy)
+            law = self._base.law_state(base_state)
+            shown = [law[:, :, index] for index in self._shown]
+        base_forces = base_action * value["thruster_limit"]
+        wrench = np.einsum("bwt,bt->bw", signals.allocation, base_forces)
+        references = value["joint_references"]
+        links = self._plain.links
+        # Of the rates of the joints, that of joint i turns the links after it.
+        behind = np.arange(links - 1, 0, -1) / links
+        parts = [
+            signals.y,
+            signals.velocity,
+            signals.acceleration,
+            *(estimates[:, :, k] for k in range(estimates.shape[2])),
+            innovation,
+            *shown,
+            wrench,
+            value["thruster_command"],
+            last_action,
+            value["tail_angle"] - _sum(behind * value["joint_angles"]),
+            value["heading_error"],
+            value["tail_rate"] - _sum(behind * value["joint_rates"]),
+            _sum(value["joint_angles"]),
+            _sum(value["joint_rates"]),
+            _sum(references),
+            _sum(value["joint_reference_rates"]),
+            _sum(value["joint_reference_accelerations"]),
+            _sum((references != 0.0).astype(np.float64)),
+        ]
+        seen = np.concatenate(parts, axis=1) / self.layout.scale
+        return (
+            np.clip(seen, -self.layout.bound, self.layout.bound).astype(np.float32),
+            signals,
+            state,
+        )
+
+    def _values(self, observation: NDArray[np.float32]) -> dict[str, Array]:
+        physical = observation * self._plain.scale
+        return {name: physical[:, part] for name, part in self._plain.slices.items()}
+
+
+def _sum(values: Array) -> Array:
+    return np.asarray(values.sum(axis=1, keepdims=True))

@@ -1,0 +1,144 @@
+"""Files of agents: read back to the bit, and refused when anything about them is wrong."""
+
+import json
+import pickle
+import subprocess
+import sys
+from hashlib import sha256
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import usm_gym
+from agents.artifact import DESCRIPTION, WEIGHTS, agent_contender, make_agent, write_agent
+from agents.network import Network
+from agents.residual import Residual, ResidualPolicy
+from usm_gym.nominal import nominal_of
+from usm_gym.robot import Robot
+
+SUITE = usm_gym.suite("operation")[:2]
+NOMINAL = nominal_of(Robot(), SUITE[0])
+
+
+def network(inputs, outputs=3):
+    rng = np.random.default_rng(0)
+    sizes = (inputs, 8, outputs)
+    weights = [rng.normal(0, 0.3, pair).astype(np.float32) for pair in pairwise(sizes)]
+    biases = [rng.normal(0, 0.1, size).astype(np.float32) for size in sizes[1:]]
+    return Network(tuple(weights), tuple(biases), "tanh", "clip")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    residual = Residual(NOMINAL)
+    description = {
+        "summary": "none that has learned anything",
+        "mode": "operation",
+        "conditions": {},
+        "base": "sta",
+        "gains": residual.base.gains._asdict(),
+        "residual_scale": 2.0,
+        "action": "wrench",
+        "layout": residual.layout.fingerprint,
+        "algorithm": "ppo",
+        "seed": 0,
+        "steps": 1,
+        "training": {},
+        "scores": {},
+    }
+    write_agent(tmp_path / "agent", description, network(residual.layout.size))
+    return tmp_path / "agent"
+
+
+def change(folder, **fields):
+    description = json.loads((folder / DESCRIPTION).read_text())
+    (folder / DESCRIPTION).write_text(json.dumps({**description, **fields}))
+
+
+def test_an_agent_read_back_is_the_agent_to_the_bit(folder):
+    residual = Residual(NOMINAL, residual_scale=2.0)
+    ours = usm_gym.evaluate(ResidualPolicy(residual, network(residual.layout.size)), SUITE)
+    read = usm_gym.evaluate(agent_contender(str(folder)).make(NOMINAL), SUITE)
+    for name, values in ours.per_episode.items():
+        assert (read.per_episode[name] == values).all()
+
+
+def test_a_network_answers_alike_for_one_and_for_many():
+    net = network(44)
+    seen = np.random.default_rng(1).normal(size=(50, 44)).astype(np.float32)
+    together, _ = net.predict(seen)
+    assert (together == np.concatenate([net.predict(row[None])[0] for row in seen])).all()
+    hidden = np.tanh(seen @ net.weights[0] + net.biases[0])
+    expected = np.clip(hidden @ net.weights[1] + net.biases[1], -1, 1)
+    np.testing.assert_allclose(together, expected, atol=2e-6)
+
+
+class Bomb:
+    def __reduce__(self):
+        return (sys.exit, ("the agent's code was run",))
+
+
+def with_weights(folder, data):
+    (folder / WEIGHTS).write_bytes(data)
+    change(folder, weights=sha256(data).hexdigest())
+
+
+def tampered(folder):
+    data = bytearray((folder / WEIGHTS).read_bytes())
+    data[-3] ^= 1
+    (folder / WEIGHTS).write_bytes(bytes(data))
+
+
+def truncated(folder):
+    with_weights(folder, (folder / WEIGHTS).read_bytes()[:-100])
+
+
+def poisoned(folder):
+    with_weights(folder, pickle.dumps(Bomb()))
+
+
+def lost(folder):
+    (folder / WEIGHTS).unlink()
+
+
+def cut_short(folder):
+    text = (folder / DESCRIPTION).read_text()
+    (folder / DESCRIPTION).write_text(text[: len(text) // 2])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (tampered, "SHA-256"),
+        (truncated, "is no network"),
+        (poisoned, "is no network"),
+        (lost, WEIGHTS),
+        (cut_short, "is no agent"),
+        (lambda folder: change(folder, layout="0123"), "observation layout"),
+        (lambda folder: change(folder, action="thrusters"), "observation layout"),
+        (lambda folder: change(folder, base="nobody"), "policy is 'nobody'"),
+        (lambda folder: change(folder, base="os:system"), "policy is 'os:system'"),
+        (lambda folder: change(folder, gains={"surface": "1"}), "gains"),
+        (lambda folder: change(folder, residual_scale=-1.0), "residual_scale"),
+        (lambda folder: change(folder, also=1), "also"),
+        (lambda folder: change(folder, output="exec"), "output"),
+    ],
+)
+def test_a_spoilt_agent_is_refused_in_one_line(folder, spoil, message):
+    spoil(folder)
+    with pytest.raises((ValueError, OSError), match=message) as caught:
+        make_agent(NOMINAL, str(folder))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_line_takes_a_folder(folder, tmp_path):
+    code = "import sys; from agents.main import main; main(sys.argv[1:])"
+    command = [sys.executable, "-c", code, "evaluate", "--policies", str(folder), "--episodes", "1"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    tampered(folder)
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 2
+    assert answer.stderr.count("\n") == 1
+    assert "SHA-256" in answer.stderr

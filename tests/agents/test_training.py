@@ -1,0 +1,149 @@
+"""Training: goes on after an interruption to the bit, says when it diverges, leaves an agent."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+import usm_gym
+from agents import algorithms, training
+from agents.artifact import make_agent
+from agents.sb3_vec_env import SB3VecEnv
+from agents.training import DivergedError, Plan, train
+from usm_gym.nominal import nominal_of
+from usm_gym.robot import Robot
+
+# Small: 16 robots, so that a rollout of PPO has 1024 steps; two validation episodes.
+SMALL = """
+from agents import training
+training.ROBOTS = {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4}
+training.VALIDATION_EPISODES = 2
+"""
+PLAN = Plan(steps=4096, interval=1024)
+SILENT = lambda steps, line: None  # noqa: E731
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    monkeypatch.setattr(training, "ROBOTS", {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4})
+    monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
+
+
+def errors(curve):
+    return [(point["steps"], point["max_error_x"], point["max_error_y"]) for point in curve]
+
+
+def test_a_killed_training_goes_on_to_the_bit(tmp_path):
+    whole = train(PLAN, tmp_path / "whole", SILENT)
+    code = f"{SMALL}\nfrom pathlib import Path\nimport sys\n"
+    code += "plan = training.Plan(steps=4096, interval=1024)\n"
+    code += "training.train(plan, Path(sys.argv[1]), lambda steps, line: None)"
+    folder = tmp_path / "killed"
+    process = subprocess.Popen([sys.executable, "-c", code, str(folder)])
+    while len(training.checkpoints(folder)) == 0 or len(read_curve(folder)) < 2:
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert len(read_curve(folder)) < len(whole)
+    resumed = train(training.read_plan(folder), folder, SILENT)
+    assert errors(resumed) == errors(whole)
+    models = [
+        PPO.load(training.latest_checkpoint(each) / "model.zip", device="cpu")
+        for each in (tmp_path / "whole", folder)
+    ]
+    for ours, theirs in zip(*(model.policy.parameters() for model in models), strict=True):
+        assert (ours == theirs).all()
+
+
+def read_curve(folder):
+    try:
+        return json.loads((folder / training.CURVE).read_text())
+    except FileNotFoundError:
+        return []
+
+
+@pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
+def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeypatch):
+    settings = algorithms.OFF_POLICY | {"learning_starts": 100, "buffer_size": 1000}
+    monkeypatch.setattr(algorithms, "OFF_POLICY", settings)
+    train(Plan(algorithm=algorithm, steps=200, interval=100), tmp_path, SILENT)
+    curve = train(Plan(algorithm=algorithm, steps=300, interval=100), tmp_path, SILENT)
+    assert [point["steps"] for point in curve] == [0, 100, 200, 300]
+    scenarios = usm_gym.suite("operation")[:1]
+    policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path))
+    assert not usm_gym.evaluate(policy, scenarios).failed.any()
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
+def test_a_network_is_what_the_model_does(algorithm):
+    envs = gym.make_vec(
+        "agents:USM-OperationResidual-v0",
+        num_envs=2,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode="SameStep",
+    )
+    model = algorithms.ALGORITHMS[algorithm](SB3VecEnv(envs), 3)
+    with torch.no_grad():
+        for each in model.policy.parameters():
+            each.mul_(3.0)
+    seen = np.random.default_rng(0).normal(size=(100, 44)).astype(np.float32)
+    expected, _ = model.predict(seen, deterministic=True)
+    found, _ = algorithms.network_of(algorithm, model).predict(seen)
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+    assert np.abs(found).max() > 0.01
+
+
+def test_a_diverging_training_is_stopped_with_a_clear_word(tmp_path, monkeypatch):
+    def wild(env, actions):
+        model = algorithms.ppo(env, actions)
+        model.lr_schedule = lambda remaining: 1e30
+        return model
+
+    monkeypatch.setitem(training.ALGORITHMS, "ppo", wild)
+    with pytest.raises(
+        DivergedError, match=r"diverged after \d+ steps: .*; the last checkpoint is"
+    ):
+        train(PLAN, tmp_path, SILENT)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"algorithm": "luck"}, "algorithm is 'luck'"),
+        ({"env": "CartPole-v1"}, "env is 'CartPole-v1'"),
+        ({"steps": 0}, "steps"),
+        ({"seed": -1}, "seed is -1"),
+        ({"base": "os:system"}, "base is 'os:system'"),
+    ],
+)
+def test_bad_plans_are_refused(fields, message):
+    with pytest.raises(ValueError, match=message):
+        Plan(**fields)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--resume"], "holds no training"),
+        (["--algorithm", "luck"], "algorithm is 'luck'"),
+        (["--resume", "--seed", "1"], "--resume"),
+        (["--conditions", "stormy"], "conditions is 'stormy'"),
+    ],
+)
+def test_the_command_refuses_in_one_line(options, message, tmp_path):
+    code = "import sys; from agents.main import main; main(sys.argv[1:])"
+    command = [sys.executable, "-c", code, "train", "--output", str(tmp_path / "new"), *options]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 2
+    assert answer.stderr.count("\n") == 1
+    assert message in answer.stderr
+    assert not (tmp_path / "new").exists()
