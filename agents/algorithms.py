@@ -6,11 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
+from gymnasium.spaces import Box
 from sb3_contrib import TQC
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
+from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from agents.network import Activation, Network
@@ -33,19 +36,19 @@ class Falling:
         return self.start * (0.1 + 0.9 * remaining)
 
 
-def ppo(env: Any, actions: int) -> BaseAlgorithm:
+def ppo(env: VecEnv) -> BaseAlgorithm:
     """PPO: small exploration around the base, which a new network leaves as it is."""
     model = PPO(
         "MlpPolicy",
         env,
         n_steps=64,
         batch_size=1024,
-        n_epochs=4,
+        n_epochs=6,
         learning_rate=Falling(5e-4),
         gamma=0.97,
         gae_lambda=0.95,
         target_kl=0.03,
-        policy_kwargs={"net_arch": [64, 64], "activation_fn": nn.Tanh, "log_std_init": -1.5},
+        policy_kwargs={"net_arch": [128, 128], "activation_fn": nn.Tanh, "log_std_init": -1.5},
         device="cpu",
     )
     _near_zero(model.policy.action_net)
@@ -60,38 +63,41 @@ OFF_POLICY: dict[str, Any] = {
     "gamma": 0.97,
     "train_freq": 1,
     "gradient_steps": 4,
-    "policy_kwargs": {"net_arch": [128, 128]},
     "device": "cpu",
 }
 
 
-def sac(env: Any, actions: int) -> BaseAlgorithm:
+def sac(env: VecEnv) -> BaseAlgorithm:
     """SAC."""
-    model = SAC("MlpPolicy", env, ent_coef="auto_0.01", **OFF_POLICY)
+    model = SAC("MlpPolicy", env, ent_coef="auto_0.01", policy_kwargs=_hidden(), **OFF_POLICY)
     _near_zero(model.actor.mu)
     return model
 
 
-def tqc(env: Any, actions: int) -> BaseAlgorithm:
+def tqc(env: VecEnv) -> BaseAlgorithm:
     """TQC: SAC with truncated quantile critics."""
-    model = TQC("MlpPolicy", env, ent_coef="auto_0.01", **OFF_POLICY)
+    model = TQC("MlpPolicy", env, ent_coef="auto_0.01", policy_kwargs=_hidden(), **OFF_POLICY)
     _near_zero(model.actor.mu)
     return model
 
 
-def td3(env: Any, actions: int) -> BaseAlgorithm:
-    """TD3."""
-    import numpy as np
-
+def td3(env: VecEnv) -> BaseAlgorithm:
+    """TD3, exploring with independent noise."""
+    assert isinstance(env.action_space, Box)
+    actions = env.action_space.shape[0]
     noise = NormalActionNoise(np.zeros(actions), np.full(actions, 0.2))
     model = TD3(
-        "MlpPolicy", env, action_noise=VectorizedActionNoise(noise, env.num_envs), **OFF_POLICY
+        "MlpPolicy",
+        env,
+        action_noise=VectorizedActionNoise(noise, env.num_envs),
+        policy_kwargs=_hidden(),
+        **OFF_POLICY,
     )
     _near_zero(model.actor.mu[-2])
     return model
 
 
-ALGORITHMS: dict[str, Callable[[Any, int], BaseAlgorithm]] = {
+ALGORITHMS: dict[str, Callable[[VecEnv], BaseAlgorithm]] = {
     "ppo": ppo,
     "sac": sac,
     "td3": td3,
@@ -117,6 +123,10 @@ def network_of(algorithm: str, model: Any) -> Network:
         activation,
         "clip" if algorithm == "ppo" else "tanh",
     )
+
+
+def _hidden() -> dict[str, Any]:
+    return {"net_arch": [128, 128]}  # a new one for each model, which writes into it
 
 
 def _near_zero(layer: Any) -> None:

@@ -27,7 +27,7 @@ from baselines.registry import make, register
 from usm_gym.files import write_bytes, write_json
 from usm_gym.nominal import Nominal
 from usm_gym.scenario import Mode
-from usm_gym.validation import CONFIG, Count, Number, Positive, in_one_line, require
+from usm_gym.validation import CONFIG, Number, Positive, in_one_line, require
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
 PRETRAINED = Path(__file__).with_name("pretrained")
@@ -69,7 +69,7 @@ class Agent:
     weights: str
     algorithm: str
     seed: int
-    steps: Count
+    steps: int
     training: dict[str, Any]
     scores: dict[str, Any]
 

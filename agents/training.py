@@ -45,6 +45,8 @@ PLAN, CURVE, STATE, MODEL, REPLAY = "plan.json", "curve.json", "state", "model.z
 VALIDATION_EPISODES = 32
 # A training has diverged when so many validations in a row are so many times worse than the best.
 COLLAPSE_COUNT, COLLAPSE_RATIO = 3, 5.0
+# And when a weight is larger than this.
+LARGEST_WEIGHT = 1e6
 
 VALIDATED = ("max_error_x", "max_error_y", "thrust_variation")
 
@@ -147,28 +149,24 @@ def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
     face = SB3VecEnv(envs, REWARD_SCALE)
     keeper = Keeper(plan, folder, envs, face, report)
     checkpoint = latest_checkpoint(folder)
-    if checkpoint is None:
-        model = begin(plan, face, envs.residual.actions)
-    else:
-        model = keeper.resume(checkpoint)
+    model = begin(plan, face) if checkpoint is None else keeper.resume(checkpoint)
     formats = ["tensorboard"] if find_spec("tensorboard") else []
     model.set_logger(configure(str(folder), formats))
     remaining = plan.steps - model.num_timesteps
     if remaining > 0:
         try:
             model.learn(remaining, callback=keeper, reset_num_timesteps=checkpoint is None)
-        except DivergedError:
+        except ValueError:
+            keeper.check_weights(model)  # torch refuses distributions that are none
             raise
-        except ValueError as error:  # torch and the environment refuse what is no number
-            raise keeper.diverged(in_one_line(error)) from error
     return keeper.curve
 
 
-def begin(plan: Plan, face: SB3VecEnv, actions: int) -> BaseAlgorithm:
+def begin(plan: Plan, face: SB3VecEnv) -> BaseAlgorithm:
     """Make the model and choose the first episodes."""
     set_random_seed(plan.seed)
     face.action_space.seed(plan.seed)
-    model = ALGORITHMS[plan.algorithm](face, actions)
+    model = ALGORITHMS[plan.algorithm](face)
     random = stream(plan.seed, TRAINING)
     face.seed(int(random.integers(2**31)))
     # First episodes of all lengths, so that afterwards the robots are at all times of an episode.
@@ -213,7 +211,7 @@ class Keeper(BaseCallback):
         self.curve: list[dict[str, Any]] = []
 
     def _on_rollout_start(self) -> None:
-        self._check_weights()
+        self.check_weights(self.model)
         self._report(self.num_timesteps, self._line)
         if self.num_timesteps >= self._next:
             self._next = self.num_timesteps + self._plan.interval
@@ -224,17 +222,18 @@ class Keeper(BaseCallback):
         return True
 
     def _on_training_end(self) -> None:
-        self._check_weights()
+        self.check_weights(self.model)
         self._validate()
         self._write_checkpoint()
 
-    def diverged(self, reason: str) -> DivergedError:
-        """The error that stops a diverging training, which says where to go on from."""
-        kept = latest_checkpoint(self._folder)
-        where = f"the last checkpoint is {kept}" if kept else "there is no checkpoint"
-        return DivergedError(
-            f"the training has diverged after {self.num_timesteps} steps: {reason}; {where}"
-        )
+    def check_weights(self, model: BaseAlgorithm) -> None:
+        """Stop if a weight has grown out of all bounds, or is no longer a number.
+
+        Raises:
+            DivergedError: If so.
+        """
+        if not all((each.abs() < LARGEST_WEIGHT).all() for each in model.policy.parameters()):
+            raise self._diverged(model.num_timesteps, f"a weight is beyond {LARGEST_WEIGHT:g}")
 
     def resume(self, checkpoint: Path) -> BaseAlgorithm:
         """Load the model of a checkpoint and put everything else back as it was."""
@@ -252,10 +251,6 @@ class Keeper(BaseCallback):
         np.random.set_state(state["numpy"])  # noqa: NPY002 (where SB3 draws from)
         torch.set_rng_state(state["torch"])
         return model
-
-    def _check_weights(self) -> None:
-        if not all(torch.isfinite(each).all() for each in self.model.policy.parameters()):
-            raise self.diverged("a weight is not finite")
 
     def _validate(self) -> None:
         network = network_of(self._plan.algorithm, self.model)
@@ -277,7 +272,13 @@ class Keeper(BaseCallback):
         limit = COLLAPSE_RATIO * _error(self._best[0])
         last = self.curve[-COLLAPSE_COUNT:]
         if len(last) == COLLAPSE_COUNT and all(_error(each) > limit for each in last):
-            raise self.diverged(f"the error is {COLLAPSE_RATIO:g} times the best and more")
+            reason = f"the error is {COLLAPSE_RATIO:g} times the best and more"
+            raise self._diverged(self.num_timesteps, reason)
+
+    def _diverged(self, steps: int, reason: str) -> DivergedError:
+        kept = latest_checkpoint(self._folder)
+        where = f"the last checkpoint is {kept}" if kept else "there is no checkpoint"
+        return DivergedError(f"the training has diverged after {steps} steps: {reason}; {where}")
 
     def _write_checkpoint(self) -> None:
         part = self._folder / "checkpoint.part"

@@ -98,6 +98,34 @@ def test_ppo_trains_on_it():
     assert np.isfinite(scores.per_episode["max_error_x"]).all()
 
 
+def test_the_residual_task_has_this_face_too():
+    envs = gym.make_vec(
+        "agents:USM-OperationResidual-v0",
+        num_envs=3,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode="SameStep",
+        conditions=HARD,
+    )
+    scaled, plain = SB3VecEnv(envs, reward_scale=0.1), face(3, conditions=HARD)
+    policy = baselines.make("sta", plain)
+    for each in (scaled, plain):
+        each.seed(5)
+    scaled.reset()
+    observations, state, done = plain.reset(), None, np.ones(3, bool)
+    ends = 0
+    for _ in range(700):
+        actions, state = policy.predict(observations, state, done)
+        observations, rewards, done, infos = plain.step(actions)
+        seen, its_rewards, its_done, its_infos = scaled.step(np.zeros((3, 3), np.float32))
+        np.testing.assert_allclose(its_rewards, 0.1 * rewards, rtol=1e-6)
+        assert (its_done == done).all()
+        for index in np.flatnonzero(done):
+            ends += 1
+            assert its_infos[index]["episode"]["r"] == infos[index]["episode"]["r"]
+            assert its_infos[index]["terminal_observation"].shape == seen[index].shape
+    assert ends >= 3
+
+
 def test_other_environments_are_refused():
     envs = gym.make_vec(ID, num_envs=2, vectorization_mode="vector_entry_point")
     with pytest.raises(ValueError, match="autoreset_mode is 'NextStep'"):
