@@ -11,9 +11,10 @@ import numpy as np
 from baselines.leaderboard import MAIN, Document
 from usm_gym.statistics import performance_profile
 
-# Colour and line style tell twenty policies apart.
+# Colour and line style, or colour and marker, tell thirty policies apart.
 COLOURS = 10
 STYLES = ("-", "--", ":")
+MARKERS = ("o", "s", "^")
 SHADE = 0.15
 
 
@@ -95,23 +96,24 @@ def _variation(rows: Mapping[str, Any], front: Mapping[str, Any]) -> Any:
     """Error against thrust variation, and the fronts of the tuned laws."""
     from matplotlib import pyplot as plt
 
-    figure, panels = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
+    figure, panels = plt.subplots(1, 2, figsize=(11, 6), layout="constrained")
     for panel, axis in zip(panels, "xy", strict=True):
         for number, (name, row) in enumerate(rows.items()):
             variation = row["thrust_variation"]["mean"]
             if variation > 0:
                 error = 1e3 * row[f"max_error_{axis}"]["mean"]
-                panel.plot(variation, error, "o", color=_style(number)["color"])
-                panel.annotate(
-                    name, (variation, error), (4, 3), textcoords="offset points", fontsize=7
-                )
+                marker = MARKERS[number // COLOURS % len(MARKERS)]
+                color = _style(number)["color"]
+                panel.plot(variation, error, marker, color=color, linestyle="none", label=name)
         for name, points in front.items():
             panel.plot(
                 [each["thrust_variation"] for each in points],
                 [1e3 * each[f"max_error_{axis}"] for each in points],
                 ".-",
+                color="0.5",
                 linewidth=1,
-                label=name,
+                zorder=0,
+                label=f"{name}, other weights",
             )
         panel.set(
             xscale="log",
@@ -120,8 +122,9 @@ def _variation(rows: Mapping[str, Any], front: Mapping[str, Any]) -> Any:
             ylabel=f"error in {axis} [mm]",
         )
         panel.grid(alpha=0.3)
-    if front:
-        panels[0].legend(title="tuned with other weights", fontsize=8)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), fontsize=8, ncols=6, loc="outside lower center"
+    )
     return figure
 
 
