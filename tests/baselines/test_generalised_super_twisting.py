@@ -21,7 +21,10 @@ def law(sigma, h, k_1, k_2, linear, state):  # type: ignore[no-untyped-def]
 
 @numba.njit
 def plain(sigma, h, gains, state):  # type: ignore[no-untyped-def]
-    return super_twisting.implicit_super_twisting(sigma, h, gains, state)
+    u, state[0], state[1] = super_twisting.implicit_super_twisting(
+        sigma, h, gains, state[0], state[1]
+    )
+    return u
 
 
 def test_the_implicit_step_solves_its_equation() -> None:
