@@ -1,0 +1,47 @@
+"""Shipped agents: policies like the scripted ones, and as good as their files say."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import agents  # noqa: F401 (registers them)
+import baselines
+import usm_gym
+from agents.artifact import DESCRIPTION, PRETRAINED, read_agent
+from usm_gym.nominal import nominal_of
+from usm_gym.robot import Robot
+from usm_gym.scenario import Conditions, sample
+from usm_gym.seeding import EVALUATION, stream
+
+SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
+
+
+@pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
+def test_a_shipped_agent_beats_its_base_as_it_says(folder):
+    assert folder.name in baselines.ids()
+    agent, _ = read_agent(folder)
+    conditions = Conditions(**agent.conditions)
+    scenarios = [sample(agent.mode, conditions, stream(11, EVALUATION, i)) for i in range(16)]
+    nominal = nominal_of(Robot(), scenarios[0])
+    ours, base = (
+        usm_gym.evaluate(baselines.make(id, nominal), scenarios) for id in (folder.name, agent.base)
+    )
+    assert not ours.failed.any()
+    for axis in "xy":
+        name = f"max_error_{axis}"
+        error = ours.per_episode[name].mean()
+        assert error < base.per_episode[name].mean()
+        np.testing.assert_array_less(error, 2.0 * agent.scores["validation"][name])
+
+
+def test_scoring_a_shipped_agent_does_not_import_torch():
+    code = """
+import sys, agents, baselines, usm_gym
+from usm_gym.nominal import nominal_of
+suite = usm_gym.suite("operation")[:1]
+usm_gym.evaluate(baselines.make("residual-ppo", nominal_of(usm_gym.Robot(), suite[0])), suite)
+sys.exit("torch" in sys.modules)
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
