@@ -29,7 +29,8 @@ from stable_baselines3.common.utils import set_random_seed
 
 from agents.algorithms import ALGORITHMS, CLASSES, REWARD_SCALE, ROBOTS, network_of
 from agents.artifact import write_agent
-from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy, ResidualVectorEnv
+from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy
+from agents.residual_env import ResidualVectorEnv
 from agents.sb3_vec_env import SB3VecEnv
 from baselines.scoring import shared_nominal
 from usm_gym.evaluation import evaluate
@@ -50,6 +51,9 @@ LARGEST_WEIGHT = 1e6
 
 VALIDATED = ("max_error_x", "max_error_y", "thrust_variation")
 
+# Fields of a plan, and of an agent's description, that are arguments of the residual task.
+TASK = ("residual_scale", "action", "omit", "frames")
+
 Report = Callable[[int, str], None]
 
 
@@ -67,6 +71,8 @@ class Plan:
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, N and N m.
         action: What the action is: "wrench" or "thrusters".
+        omit: Entries of the observation that the agent is not shown.
+        frames: How many observations it sees at once.
         conditions: Conditions from which scenarios are sampled.
         seed: Seed of everything random.
         steps: Control periods to train on, over all robots.
@@ -78,6 +84,8 @@ class Plan:
     base: str = "sta"
     residual_scale: Positive = RESIDUAL_SCALE
     action: ActionKind = "wrench"
+    omit: tuple[str, ...] = ()
+    frames: Count = 1
     conditions: Conditions = FIELD
     seed: int = 0
     steps: Count = 3_000_000
@@ -96,6 +104,11 @@ class Plan:
         """The mode of the task."""
         mode: Mode = gym.registry[self.env.removeprefix("agents:")].kwargs["mode"]
         return mode
+
+    @property
+    def task(self) -> dict[str, Any]:
+        """What the residual task is, but for its base."""
+        return {name: getattr(self, name) for name in TASK}
 
     def scenario(self, random: np.random.Generator) -> Scenario:
         """Draw a scenario of the training distribution."""
@@ -140,10 +153,9 @@ def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
         num_envs=ROBOTS[plan.algorithm],
         vectorization_mode="vector_entry_point",
         autoreset_mode="SameStep",
-        base=plan.base,
-        residual_scale=plan.residual_scale,
-        action=plan.action,
         conditions=plan.conditions,
+        base=plan.base,
+        **plan.task,
     )
     assert isinstance(envs, ResidualVectorEnv)
     face = SB3VecEnv(envs, REWARD_SCALE)
@@ -316,8 +328,7 @@ class Keeper(BaseCallback):
             "conditions": recorded["conditions"],
             "base": plan.base.partition("@")[0],
             "gains": gains._asdict() if gains else {},
-            "residual_scale": plan.residual_scale,
-            "action": plan.action,
+            **plan.task,
             "layout": residual.layout.fingerprint,
             "algorithm": plan.algorithm,
             "seed": plan.seed,

@@ -31,6 +31,7 @@ OPTIONS = (
     ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
     ("residual_scale", float, "N", "largest residual, N and N m (default: 6)"),
     ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
+    ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of everything random (default: 0)"),
     ("steps", int, "N", "steps of all robots together (default: 3000000)"),
     ("interval", int, "N", "steps between checkpoints (default: 250000)"),
@@ -49,6 +50,7 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     for name, kind, metavar, text in OPTIONS:
         add(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
+    add("--omit", metavar="A,B", help="entries of the observation that the agent is not shown")
     add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
     add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
     add("--resume", action="store_true", help="go on from the last checkpoint in that folder")
@@ -66,9 +68,11 @@ def run(arguments: argparse.Namespace) -> None:
     )
     from agents.training import PLAN, Plan, read_plan, train
 
-    names = [name for name, *_ in OPTIONS] + ["conditions"]
+    names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
     given = {name: getattr(arguments, name) for name in names}
     given = {name: value for name, value in given.items() if value is not None}
+    if "omit" in given:
+        given["omit"] = tuple(given["omit"].split(","))
     if "conditions" in given:
         given["conditions"] = parse_conditions(given["conditions"])
     if arguments.resume:
