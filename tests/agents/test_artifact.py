@@ -40,6 +40,8 @@ def folder(tmp_path):
         "gains": residual.base.gains._asdict(),
         "residual_scale": 2.0,
         "action": "wrench",
+        "omit": [],
+        "frames": 1,
         "layout": residual.layout.fingerprint,
         "algorithm": "ppo",
         "seed": 0,
