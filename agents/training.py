@@ -8,8 +8,10 @@ What is passed on is the agent (`agents.artifact`).
 from __future__ import annotations
 
 import dataclasses
+import json
 import pickle
 import random
+import shlex
 import shutil
 import time
 from collections.abc import Callable
@@ -27,7 +29,15 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
-from agents.algorithms import ALGORITHMS, CLASSES, REWARD_SCALE, ROBOTS, network_of
+from agents.algorithms import (
+    CLASSES,
+    HIDDEN,
+    REWARD_SCALE,
+    ROBOTS,
+    SETTINGS,
+    make_model,
+    network_of,
+)
 from agents.artifact import write_agent
 from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy
 from agents.residual_env import ResidualVectorEnv
@@ -38,12 +48,14 @@ from usm_gym.files import write_json
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
 from usm_gym.scenario import FIELD, Conditions, Mode, Scenario, sample
-from usm_gym.seeding import TRAINING, VALIDATION, stream
+from usm_gym.seeding import EVALUATION, TRAINING, VALIDATION, stream
 from usm_gym.validation import CONFIG, Count, Positive, in_one_line, require
 
 PLAN, CURVE, STATE, MODEL, REPLAY = "plan.json", "curve.json", "state", "model.zip", "replay"
 # Held-out scenarios of the training distribution, the same for all trainings.
 VALIDATION_EPISODES = 32
+# The scenarios on which the agent is scored in the end, as `usm evaluate` samples them.
+TEST_SEED, TEST_EPISODES = 7, 100
 # A training has diverged when so many validations in a row are so many times worse than the best.
 COLLAPSE_COUNT, COLLAPSE_RATIO = 3, 5.0
 # And when a weight is larger than this.
@@ -93,7 +105,7 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained."""
-        require(self.algorithm in ALGORITHMS, "algorithm", self.algorithm, ", ".join(ALGORITHMS))
+        require(self.algorithm in CLASSES, "algorithm", self.algorithm, ", ".join(CLASSES))
         require(self.seed >= 0, "seed", self.seed, "0 or more")
         known = [id for id in gym.registry if id.endswith("Residual-v0")]
         require(self.env.removeprefix("agents:") in known, "env", self.env, ", ".join(known))
@@ -109,6 +121,22 @@ class Plan:
     def task(self) -> dict[str, Any]:
         """What the residual task is, but for its base."""
         return {name: getattr(self, name) for name in TASK}
+
+    def command(self, output: str) -> str:
+        """The command that does it."""
+        words = ["usm", "train"]
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if value == field.default:
+                continue
+            if isinstance(value, tuple):
+                value = ",".join(value)
+            if isinstance(value, Conditions):
+                changed = _PLAN.dump_python(self, mode="json")["conditions"].items()
+                usual = dataclasses.asdict(FIELD)
+                value = json.dumps({k: v for k, v in changed if v != _listed(usual[k])})
+            words += [f"--{field.name.replace('_', '-')}", str(value)]
+        return shlex.join([*words, "--output", output])
 
     def scenario(self, random: np.random.Generator) -> Scenario:
         """Draw a scenario of the training distribution."""
@@ -178,7 +206,7 @@ def begin(plan: Plan, face: SB3VecEnv) -> BaseAlgorithm:
     """Make the model and choose the first episodes."""
     set_random_seed(plan.seed)
     face.action_space.seed(plan.seed)
-    model = ALGORITHMS[plan.algorithm](face)
+    model = make_model(plan.algorithm, face)
     random = stream(plan.seed, TRAINING)
     face.seed(int(random.integers(2**31)))
     # First episodes of all lengths, so that afterwards the robots are at all times of an episode.
@@ -220,6 +248,7 @@ class Keeper(BaseCallback):
         self._line = ""
         self._began, self._seconds = time.monotonic(), 0.0
         self._best: Any = None
+        self._scores: dict[str, Any] = {}
         self.curve: list[dict[str, Any]] = []
 
     def _on_rollout_start(self) -> None:
@@ -236,6 +265,7 @@ class Keeper(BaseCallback):
     def _on_training_end(self) -> None:
         self.check_weights(self.model)
         self._validate()
+        self._test()
         self._write_checkpoint()
 
     def check_weights(self, model: BaseAlgorithm) -> None:
@@ -287,6 +317,18 @@ class Keeper(BaseCallback):
             reason = f"the error is {COLLAPSE_RATIO:g} times the best and more"
             raise self._diverged(self.num_timesteps, reason)
 
+    def _test(self) -> None:
+        """Score the best agent on scenarios that chose nothing."""
+        plan, (_, network) = self._plan, self._best
+        scenarios = [
+            sample(plan.mode, FIELD, stream(TEST_SEED, EVALUATION, i)) for i in range(TEST_EPISODES)
+        ]
+        summary = evaluate(ResidualPolicy(self._envs.residual, network), scenarios).summary()
+        del summary["per_episode"]
+        chosen = f"--mode {plan.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"
+        command = f"usm evaluate --policies {self._folder.name} {chosen}"
+        self._scores["sampled"] = {"command": command, **summary}
+
     def _diverged(self, steps: int, reason: str) -> DivergedError:
         kept = latest_checkpoint(self._folder)
         where = f"the last checkpoint is {kept}" if kept else "there is no checkpoint"
@@ -335,10 +377,13 @@ class Keeper(BaseCallback):
             "steps": point["steps"],
             "training": {
                 "plan": recorded,
+                "settings": SETTINGS[plan.algorithm]
+                | {"hidden": HIDDEN, "robots": ROBOTS[plan.algorithm], "reward": REWARD_SCALE},
                 "curve": self.curve,
+                "command": plan.command(self._folder.name),
                 "provenance": provenance({"seed": plan.seed}),
             },
-            "scores": {"validation": point},
+            "scores": {"validation": point, **self._scores},
         }
         write_agent(self._folder, description, network)
 
@@ -352,6 +397,10 @@ def latest_checkpoint(folder: Path) -> Path | None:
     """The last complete checkpoint, if there is one."""
     found = checkpoints(folder)
     return found[-1] if found else None
+
+
+def _listed(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _error(point: dict[str, Any]) -> float:

@@ -25,7 +25,7 @@ from usm_gym.robot import Robot
 SMALL = """
 from agents import training
 training.ROBOTS = {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4}
-training.VALIDATION_EPISODES = 2
+training.VALIDATION_EPISODES = training.TEST_EPISODES = 2
 """
 PLAN = Plan(steps=4096, interval=1024)
 SILENT = lambda steps, line: None  # noqa: E731
@@ -35,6 +35,7 @@ SILENT = lambda steps, line: None  # noqa: E731
 def small(monkeypatch):
     monkeypatch.setattr(training, "ROBOTS", {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4})
     monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
+    monkeypatch.setattr(training, "TEST_EPISODES", 2)
 
 
 def errors(curve):
@@ -73,8 +74,9 @@ def read_curve(folder):
 
 @pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
 def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeypatch):
-    settings = algorithms.OFF_POLICY | {"learning_starts": 100, "buffer_size": 1000}
-    monkeypatch.setattr(algorithms, "OFF_POLICY", settings)
+    settings = algorithms.SETTINGS[algorithm]
+    monkeypatch.setitem(settings, "learning_starts", 100)
+    monkeypatch.setitem(settings, "buffer_size", 1000)
     train(Plan(algorithm=algorithm, steps=200, interval=100), tmp_path, SILENT)
     curve = train(Plan(algorithm=algorithm, steps=300, interval=100), tmp_path, SILENT)
     assert [point["steps"] for point in curve] == [0, 100, 200, 300]
@@ -91,7 +93,7 @@ def test_a_network_is_what_the_model_does(algorithm):
         vectorization_mode="vector_entry_point",
         autoreset_mode="SameStep",
     )
-    model = algorithms.ALGORITHMS[algorithm](SB3VecEnv(envs))
+    model = algorithms.make_model(algorithm, SB3VecEnv(envs))
     with torch.no_grad():
         for each in model.policy.parameters():
             each.mul_(3.0)
@@ -103,12 +105,12 @@ def test_a_network_is_what_the_model_does(algorithm):
 
 
 def test_a_diverging_training_is_stopped_with_a_clear_word(tmp_path, monkeypatch):
-    def wild(env):
-        model = algorithms.ppo(env)
+    def wild(algorithm, env):
+        model = algorithms.make_model(algorithm, env)
         model.lr_schedule = lambda remaining: 1e30
         return model
 
-    monkeypatch.setitem(training.ALGORITHMS, "ppo", wild)
+    monkeypatch.setattr(training, "make_model", wild)
     with pytest.raises(
         DivergedError, match=r"diverged after \d+ steps: .*; the last checkpoint is"
     ):
