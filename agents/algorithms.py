@@ -29,10 +29,10 @@ _OFF_POLICY: dict[str, Any] = {
     "learning_rate": 5e-4,
     "buffer_size": 300_000,
     "learning_starts": 10_000,
-    "batch_size": 512,
+    "batch_size": 256,
     "gamma": 0.97,
     "train_freq": 1,
-    "gradient_steps": 4,
+    "gradient_steps": 2,
 }
 # Arguments of each algorithm that are not Stable-Baselines3's defaults. The rate of PPO falls
 # linearly to a tenth over the training; TD3 explores with independent noise of that deviation.

@@ -16,6 +16,7 @@ from agents.commands import (
     policies,
     reproduce,
     robustness,
+    study,
     train,
     tune,
     watch,
@@ -31,6 +32,7 @@ COMMANDS = (
     robustness,
     tune,
     train,
+    study,
     watch,
     reproduce,
     bench,
@@ -48,6 +50,7 @@ A first look, in half a minute:
   usm watch                    one of them at work
   usm tune POLICY              better gains for one of them
   usm train --output DIR       an agent that adds thrust to one of them
+  usm study residual           what trained agents owe to what
   usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here
 """

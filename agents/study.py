@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.artifact import agent_contender
+from agents.dissection import dissect
 from agents.training import CURVE, TEST_EPISODES, TEST_SEED, Plan, read_plan, train
 from baselines.contender import Contender, contender
 from baselines.scoring import Refusal, Task, score_all, shared_nominal
 from usm_gym import parallel
 from usm_gym.evaluation import Evaluation
-from usm_gym.files import write_json
 from usm_gym.robot import Robot
-from usm_gym.scenario import FIELD, IDEAL, ROUGH, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import FIELD, PRESETS, Conditions, Mode, Scenario, sample
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.statistics import interquartile_mean, interval
 from usm_gym.validation import require
@@ -81,12 +81,13 @@ PLANS = AGENTS | ABLATIONS
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
 # Where agents are taken that they have not been trained for.
 TRANSFER: dict[str, Conditions] = {
-    "ideal": IDEAL,
-    "rough": ROUGH,
+    "ideal": PRESETS["ideal"],
+    "rough": PRESETS["rough"],
     "still": replace(FIELD, motion=False),
     "coefficients": replace(FIELD, coefficient_range=(0.6, 1.4)),
 }
 HOME = "field"
+DISSECTED_EPISODES = 16
 # Kept of each episode.
 KEPT = ("max_error_x", "max_error_y", "thrust_variation", "thrust_effort")
 
@@ -311,6 +312,13 @@ def claims(found: Document) -> dict[str, Any]:
     return answer
 
 
-def keep(found: Document, folder: Path) -> None:
-    """Write the document."""
-    write_json(folder / "study.json", found)
+def dissected(chosen: Sequence[Run]) -> dict[str, Any]:
+    """What each agent, as its seed 0, does to its base; see `dissection`."""
+    found = {}
+    for run in chosen:
+        if run.name in AGENTS and run.plan.seed == 0:
+            episodes = scenarios(run.plan.mode, FIELD, DISSECTED_EPISODES)
+            nominal = shared_nominal(Robot(), episodes)
+            policy = agent_contender(str(run.folder)).make(nominal)
+            found[run.name] = dissect(policy, nominal, episodes)
+    return found
