@@ -22,7 +22,6 @@ from safetensors.numpy import load, save
 from agents.network import Activation, Network, Output
 from agents.residual import ActionKind, Residual, ResidualPolicy
 from baselines.contender import Contender, fingerprint
-from baselines.policy import Policy
 from baselines.registry import make, register
 from usm_gym.files import write_bytes, write_json
 from usm_gym.nominal import Nominal
@@ -125,7 +124,7 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
         raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
 
 
-def make_agent(nominal: Nominal, folder: str) -> Policy:
+def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     """Make the policy of an agent's folder.
 
     Raises:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.residual import Memory
+from agents.residual import Memory, ResidualPolicy
 from baselines.estimator import Estimator
 from baselines.oracle import Oracle
 from baselines.policy import Policy
@@ -62,7 +62,9 @@ class Recorder:
         return action, state
 
 
-def dissect(policy: Policy, nominal: Nominal, scenarios: Sequence[Scenario]) -> dict[str, Any]:
+def dissect(
+    policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenario]
+) -> dict[str, Any]:
     """Forces of base, residual and both, beside the needed one.
 
     Args:
@@ -71,7 +73,8 @@ def dissect(policy: Policy, nominal: Nominal, scenarios: Sequence[Scenario]) -> 
         scenarios: Episodes of one length and one thruster limit.
 
     Returns:
-        Of each axis: standard deviation of each force, N; the share of base - needed that the
+        Of each axis: standard deviation of each force, N, also of the base's when it acts alone;
+        the share of base - needed that the
         residual takes back, and the share of needed that it adds, by least squares, with the share
         of the residual's variance which the two explain; by how many seconds the whole force is
         late behind the needed one, by the largest correlation; and power spectral densities,
@@ -80,13 +83,19 @@ def dissect(policy: Policy, nominal: Nominal, scenarios: Sequence[Scenario]) -> 
     limit = scenarios[0].conditions.thruster_limit
     settled = round(scenarios[0].settle_time / nominal.control_period)
     watched = []
-    for each in (policy, Oracle(nominal)):
+    for each in (policy, policy.base, Oracle(nominal)):
         recorder = Recorder(nominal, each, limit)
         rollout(recorder, scenarios, Robot())
         watched.append(recorder)
-    total, needed = (np.stack(recorder.total)[settled:] for recorder in watched)
+    total, alone, needed = (np.stack(recorder.total)[settled:] for recorder in watched)
     base = np.stack(watched[0].base)[settled:]
-    forces = {"needed": needed, "base": base, "residual": total - base, "both": total}
+    forces = {
+        "needed": needed,
+        "base alone": alone,
+        "base": base,
+        "residual": total - base,
+        "both": total,
+    }
     frequency = welch(needed, nominal.control_period)[0]
     return {
         "frequency": frequency.tolist(),

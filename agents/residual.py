@@ -160,6 +160,7 @@ class ResidualPolicy:
 
     Attributes:
         nominal: What the policy knows of the robot.
+        base: The base policy.
         privileged: Never, here.
     """
 
@@ -172,7 +173,7 @@ class ResidualPolicy:
             residual: The residual task as in training.
             agent: What was trained on it, with `predict`.
         """
-        self.nominal = residual.nominal
+        self.nominal, self.base = residual.nominal, residual.base
         self._residual, self._agent = residual, agent
 
     def predict(

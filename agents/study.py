@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.artifact import agent_contender
+from agents.artifact import agent_contender, make_agent
 from agents.dissection import dissect
 from agents.training import CURVE, TEST_EPISODES, TEST_SEED, Plan, read_plan, train
 from baselines.contender import Contender, contender
@@ -319,6 +319,6 @@ def dissected(chosen: Sequence[Run]) -> dict[str, Any]:
         if run.name in AGENTS and run.plan.seed == 0:
             episodes = scenarios(run.plan.mode, FIELD, DISSECTED_EPISODES)
             nominal = shared_nominal(Robot(), episodes)
-            policy = agent_contender(str(run.folder)).make(nominal)
+            policy = make_agent(nominal, str(run.folder))
             found[run.name] = dissect(policy, nominal, episodes)
     return found

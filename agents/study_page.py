@@ -57,9 +57,10 @@ error of the model; rougher water; joints still; coefficients off by up to 40 %.
 brackets.
 """
 DISSECTED = """\
-The needed force is the oracle's in the same episode. The residual is split by least squares into
-a share of what the base commands in excess of it, taken back, and a share of the needed force;
-"late" is by how much the whole force follows the needed one. x / y.
+Standard deviations of the force that the base commands alone, and with the agent; of the residual;
+and of the force that was needed, which is the oracle's in the same episode. The residual is split
+by least squares into a share of what the base commands in excess of it, taken back, and a share of
+the needed force; "late" is by how much the whole force follows the needed one. x / y.
 """
 
 
@@ -110,7 +111,7 @@ def elsewhere(rows: Mapping[str, Any]) -> str:
 
 def taken(found: Mapping[str, Any]) -> str:
     """What each residual is made of."""
-    forces = ("base, N", "residual, N", "needed, N")
+    forces = ("base alone, N", "base, N", "residual, N", "needed, N")
     shares = ("excess taken back", "needed added", "explained")
     head = ("agent", *forces, *shares, "late, ms")
     lines = [_line(head), "|---|" + "---:|" * (len(head) - 1)]
@@ -118,7 +119,7 @@ def taken(found: Mapping[str, Any]) -> str:
         axes = [each["x"], each["y"]]
         cells = [
             " / ".join(figures(axis["deviation"][force]) for axis in axes)
-            for force in ("base", "residual", "needed")
+            for force in ("base alone", "base", "residual", "needed")
         ]
         cells += [
             " / ".join(f"{axis[key]:.2f}" for axis in axes)
