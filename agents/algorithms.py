@@ -23,9 +23,9 @@ CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "
 # Robots side by side: for PPO a rollout is many robots by few steps, so that little time is spent
 # between steps; the others learn after each step of all.
 ROBOTS = {"ppo": 256, "sac": 32, "td3": 32, "tqc": 32}
-HIDDEN = [64, 64]
 
 _OFF_POLICY: dict[str, Any] = {
+    "hidden": (64, 64),
     "learning_rate": 5e-4,
     "buffer_size": 300_000,
     "learning_starts": 10_000,
@@ -34,10 +34,11 @@ _OFF_POLICY: dict[str, Any] = {
     "train_freq": 1,
     "gradient_steps": 2,
 }
-# Arguments of each algorithm that are not Stable-Baselines3's defaults. The rate of PPO falls
+# Widths of the hidden layers, and arguments that are not Stable-Baselines3's defaults. The rate of PPO falls
 # linearly to a tenth over the training; TD3 explores with independent noise of that deviation.
 SETTINGS: dict[str, dict[str, Any]] = {
     "ppo": {
+        "hidden": (128, 128),
         "n_steps": 64,
         "batch_size": 1024,
         "n_epochs": 6,
@@ -67,7 +68,7 @@ class Falling:
 def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
     """A new model, whose deterministic actions are nearly zero, so that the base acts as it is."""
     arguments: dict[str, Any] = dict(SETTINGS[algorithm])
-    policy: dict[str, Any] = {"net_arch": list(HIDDEN)}
+    policy: dict[str, Any] = {"net_arch": list(arguments.pop("hidden"))}
     if algorithm == "ppo":
         policy["activation_fn"] = nn.Tanh
         policy["log_std_init"] = arguments.pop("log_std_init")

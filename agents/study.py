@@ -42,17 +42,17 @@ JOINT_REFERENCES = (
 
 # The agents that are shipped, each as its seed 0.
 AGENTS: dict[str, Plan] = {
-    "residual-ppo": Plan(steps=4_000_000),
-    "residual-sac": Plan(algorithm="sac", steps=400_000),
-    "residual-sta-tuned": Plan(base="sta-tuned", steps=2_000_000),
-    "residual-pd": Plan(base="pd", steps=2_000_000),
-    "residual-lqg": Plan(base="lqg-tuned", steps=2_000_000),
+    "residual-ppo": Plan(steps=3_000_000),
+    "residual-sta-tuned": Plan(base="sta-tuned", steps=1_000_000),
+    "residual-pd": Plan(base="pd", steps=1_500_000),
+    "residual-lqg": Plan(base="lqg-tuned", steps=1_500_000),
+    "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_000_000),
     # Without a base to correct, the agent has the whole limit of a thruster.
-    "rl-only": Plan(base="zero", residual_scale=20.0, steps=4_000_000),
-    "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_500_000),
+    "rl-only": Plan(base="zero", residual_scale=20.0, steps=3_000_000),
+    "residual-sac": Plan(algorithm="sac", steps=400_000),
 }
 
-_SHORT = Plan(steps=1_500_000)
+_SHORT = Plan(steps=1_000_000)
 _EXACT = replace(
     FIELD,
     coefficient_range=(1.0, 1.0),

@@ -31,7 +31,6 @@ from stable_baselines3.common.utils import set_random_seed
 
 from agents.algorithms import (
     CLASSES,
-    HIDDEN,
     REWARD_SCALE,
     ROBOTS,
     SETTINGS,
@@ -378,7 +377,7 @@ class Keeper(BaseCallback):
             "training": {
                 "plan": recorded,
                 "settings": SETTINGS[plan.algorithm]
-                | {"hidden": HIDDEN, "robots": ROBOTS[plan.algorithm], "reward": REWARD_SCALE},
+                | {"robots": ROBOTS[plan.algorithm], "reward_scale": REWARD_SCALE},
                 "curve": self.curve,
                 "command": plan.command(self._folder.name),
                 "provenance": provenance({"seed": plan.seed}),
