@@ -34,7 +34,7 @@ _OFF_POLICY: dict[str, Any] = {
     "train_freq": 1,
     "gradient_steps": 2,
 }
-# Widths of the hidden layers, and arguments that are not Stable-Baselines3's defaults. The rate of PPO falls
+# Widths of the hidden layers, and arguments that are not defaults. The rate of PPO falls
 # linearly to a tenth over the training; TD3 explores with independent noise of that deviation.
 SETTINGS: dict[str, dict[str, Any]] = {
     "ppo": {
