@@ -119,7 +119,9 @@ class Run:
         if not (self.folder / CURVE).exists():
             return False
         plan = read_plan(self.folder)
-        require(plan == self.plan, f"the training in {self.folder}", plan, f"{self.plan}")
+        name = self.folder.name
+        had, has = plan.command(name), self.plan.command(name)
+        require(had == has, f"the training in {self.folder}", had, has)
         return bool(self.curve[-1]["steps"] >= plan.steps)
 
     @property

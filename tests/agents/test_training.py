@@ -35,7 +35,7 @@ while True:
         training.train(plan, folder, lambda steps, line: None)
         os._exit(0)
     if kills < 10:
-        time.sleep(chance.uniform(0.0, 6.0))
+        time.sleep(chance.uniform(0.0, 4.0))
         os.kill(child, signal.SIGKILL)
         kills += 1
     _, status = os.waitpid(child, 0)
