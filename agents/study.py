@@ -74,8 +74,9 @@ ABLATIONS: dict[str, Plan] = {
     # The strongest rival as the base; its errors are small, and so is what has to be added.
     "base-lqg-joints": replace(_SHORT, base="lqg-joints-tuned", residual_scale=2.0),
 }
-ABLATION_SEEDS = 2
 PLANS = AGENTS | ABLATIONS
+# Seeds of each training at most, so that all of it takes some hours on two cores.
+SEEDS = {name: 1 if name in ABLATIONS else 3 for name in PLANS} | {"residual-ppo": 5}
 
 # Classical policies beside which the agents stand.
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
@@ -136,7 +137,7 @@ def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = Non
 
     Args:
         names: Names of agents and ablations.
-        seeds: How many seeds, from 0 on; of ablations two at most.
+        seeds: How many seeds, from 0 on, and no more than `SEEDS` of each.
         folder: Folder of the study.
         steps: How many steps each is trained; without it, as its plan says.
 
@@ -147,7 +148,7 @@ def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = Non
     for seed in range(seeds):
         for name in names:
             require(name in PLANS, "--only", name, ", ".join(PLANS))
-            if name in ABLATIONS and seed >= ABLATION_SEEDS:
+            if seed >= SEEDS[name]:
                 continue
             plan = replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
             found.append(Run(name, plan, folder / "runs" / f"{name}-{seed}"))

@@ -41,7 +41,7 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     add("subject", choices=["residual"], help="what is studied")
     add("--only", metavar="A,B", help="some agents and ablations, by name (default: all)")
-    add("--seeds", type=int, default=5, metavar="N", help="seeds of each agent (default: 5)")
+    add("--seeds", type=int, default=5, metavar="N", help="seeds of each, at most")
     add("--steps", type=int, metavar="N", help="steps of each training (default: each its own)")
     add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
     add_computing(parser)

@@ -8,7 +8,7 @@ import pytest
 from agents import study, training
 from agents.dissection import lateness
 from agents.main import main
-from agents.study import AGENTS, PLANS, runs
+from agents.study import PLANS, runs
 from usm_gym.scenario import FIELD
 
 
@@ -59,11 +59,13 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
 
 
 def test_every_seed_has_its_own_training_and_early_seeds_come_first(tmp_path):
-    found = runs(list(PLANS), 3, tmp_path)
+    found = runs(list(PLANS), 5, tmp_path)
     assert [run.plan.seed for run in found] == sorted(run.plan.seed for run in found)
     assert len({run.folder for run in found}) == len(found)
-    for name in AGENTS:
-        assert [run.plan.seed for run in found if run.name == name] == [0, 1, 2]
+    for name in PLANS:
+        seeds = [run.plan.seed for run in found if run.name == name]
+        assert seeds == list(range(study.SEEDS[name]))
+    assert study.SEEDS["residual-ppo"] == 5
     with pytest.raises(ValueError, match="--only is 'nobody'"):
         runs(["nobody"], 1, tmp_path)
 
