@@ -24,7 +24,6 @@ from baselines.prediction import Predictor, held_force
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled
-from usm_gym.validation import require
 
 MPC_SPACE: Space = {
     "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),
@@ -96,11 +95,11 @@ class MPC(ScriptedPolicy):
     The law's state is that of `prediction.Predictor`.
     """
 
+    positive = ("variation_weight", "horizon")
+
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute the gains; gains other than the defaults by name, see `MPCGains`."""
         super().__init__(nominal, MPCGains(**gains))
-        for name in ("variation_weight", "horizon"):
-            require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
         linear = kalman.linear_model(
             nominal, self.gains.acceleration_noise, self.gains.disturbance_noise
         )

@@ -170,7 +170,7 @@ def act(observation, state, model, allocation, force, heading_gain, action):
 
 
 class ScriptedPolicy:
-    """A control law behind `predict`; subclasses give `law_size` and `force`.
+    """A control law behind `predict`; subclasses give `law_size`, `positive` and `force`.
 
     Actions are not clipped: the environment saturates them, and what it has applied comes back in
     the next observation.
@@ -184,16 +184,19 @@ class ScriptedPolicy:
     privileged = False
     # Numbers of state that the law keeps for each axis.
     law_size = 0
+    # Gains that must not be 0.
+    positive: tuple[str, ...] = ()
 
     def __init__(self, nominal: Nominal, gains: Any) -> None:
         """Keep nominal knowledge and gains.
 
         Raises:
-            ValueError: If a gain is negative or not finite.
+            ValueError: If a gain is negative or not finite, or 0 though it is among `positive`.
         """
         for name, gain in gains._asdict().items():
             number = isinstance(gain, (int, float)) and np.isfinite(gain) and gain >= 0
             require(number, name, gain, "a finite number >= 0")
+            require(gain > 0 or name not in self.positive, name, gain, "a number > 0")
         self.nominal = nominal
         self.gains = type(gains)(*map(float, gains))
         self._model = model_of(nominal)
