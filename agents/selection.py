@@ -185,6 +185,20 @@ def scored(
         return score_all(chosen, workers, cache, lambda episodes: bar.advance(line, episodes))
 
 
+def by_name(
+    chosen: Sequence[Task], outcomes: Sequence[Evaluation | Refusal]
+) -> tuple[dict[str, Evaluation], dict[str, str]]:
+    """The scores of tasks by the name of the policy, and why the others have none."""
+    found: dict[str, Evaluation] = {}
+    refused: dict[str, str] = {}
+    for task, outcome in zip(chosen, outcomes, strict=True):
+        if isinstance(outcome, Refusal):
+            refused[task.contender.name] = outcome.reason
+        else:
+            found[task.contender.name] = outcome
+    return found, refused
+
+
 def leave_if_refused(refused: Mapping[str, str]) -> None:
     """Name the refused policies, one on a line, and leave with status 1 if there is one."""
     for name, reason in refused.items():

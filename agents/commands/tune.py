@@ -38,7 +38,6 @@ def add_to(subparsers: Any) -> None:
         help="look for better gains",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("policy", metavar="POLICY", help="id of a policy that declares a space of gains")
