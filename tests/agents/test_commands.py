@@ -41,9 +41,9 @@ def test_policies_lists_every_policy():
     assert all(id in answer.stdout for id in baselines.ids())
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("evaluate", "--help"), ("policies", "--help")])
-def test_help_teaches(arguments):
-    answer = usm(*arguments)
+@pytest.mark.parametrize("command", [[USM], [USM, "evaluate"], [sys.executable, "-m", "agents"]])
+def test_help_teaches(command):
+    answer = subprocess.run([*command, "--help"], capture_output=True, text=True, check=False)
     assert answer.returncode == 0
     assert "usage: usm" in answer.stdout
 
