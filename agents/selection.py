@@ -14,7 +14,7 @@ from agents.options import add_computing, computing, count, parse_conditions
 from agents.terminal import progress_bar
 from baselines.contender import Contender, contender
 from baselines.registry import entry, ids
-from baselines.scoring import TIME_LIMIT, Refusal, Task, score_all, shared_nominal
+from baselines.scoring import BATCH, TIME_LIMIT, Refusal, Task, score_all, shared_nominal
 from usm_gym.evaluation import Evaluation
 from usm_gym.robot import Robot
 from usm_gym.scenario import MODES, Conditions, Mode, Scenario, sample
@@ -66,8 +66,8 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=TIME_LIMIT,
         metavar="S",
-        help="how long a controller of your own may think in a batch of up to 32 episodes, s "
-        "(default: 120)",
+        help=f"how long a controller of your own may think in a batch of up to {BATCH} episodes, "
+        f"s (default: {TIME_LIMIT:g})",
     )
 
 
