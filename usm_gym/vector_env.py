@@ -173,27 +173,15 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         rewards, terminated, truncated = outcome(simulation)
         rewards[waiting] = 0.0
         done = terminated | truncated
-        everyone = np.ones(self.num_envs, bool)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and done.any():
+        final: dict[str, Any] = {}
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            self._done = done
+        elif done.any():
             final = self._final(done)
             self._restart(done)
-            self._follow()
-            return (
-                simulation.observation.copy(),
-                rewards,
-                terminated,
-                truncated,
-                {**final, **self._infos(everyone)},
-            )
-        self._done = done
         self._follow()
-        return (
-            simulation.observation.copy(),
-            rewards,
-            terminated,
-            truncated,
-            self._infos(everyone),
-        )
+        told = {**final, **self._infos(np.ones(self.num_envs, bool))}
+        return simulation.observation.copy(), rewards, terminated, truncated, told
 
     def snapshot(self) -> VectorSnapshot:
         """Copy the whole state, the streams from which scenarios are drawn included."""
