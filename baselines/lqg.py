@@ -6,8 +6,7 @@ where thrust and command are -(d + w): state (e, v, f + d + w, last u + d + w), 
 u. The price is on the change, not on the force, because chattering is what costs; and the last
 command is the one that was applied, so that saturation winds nothing up.
 
-Source: B. D. O. Anderson, J. B. Moore, Optimal Control: Linear Quadratic Methods, 1990, chapters 2
-and 8; section 4.3 there for the price on the input's change.
+Source: B. D. O. Anderson, J. B. Moore, Optimal Control: Linear Quadratic Methods, 1990.
 """
 
 from __future__ import annotations

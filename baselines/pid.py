@@ -1,8 +1,8 @@
 """PID with a filtered derivative and anti-windup by back-calculation.
 
 Source: K. J. Astrom, T. Hagglund, PID Controllers: Theory, Design, and Tuning, 2nd edition, 1995,
-sections 3.4 to 3.6: derivative by backward differences behind a first-order filter, integral that
-tracks the force which was really applied, with the time constant sqrt(T_i T_d).
+chapter 3: derivative by backward differences behind a first-order filter, integral that tracks the
+force which was really applied, with the time constant sqrt(T_i T_d).
 """
 
 from __future__ import annotations

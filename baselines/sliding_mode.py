@@ -5,8 +5,7 @@
 
 The integral starts where s = 0. The rate e' is that of the paper's observer, (15)-(16).
 
-Source: J.-J. E. Slotine, W. Li, Applied Nonlinear Control, 1991, section 7.1 (integral control)
-and section 7.2 (boundary layer).
+Source: J.-J. E. Slotine, W. Li, Applied Nonlinear Control, 1991, chapter 7.
 """
 
 from __future__ import annotations
