@@ -6,9 +6,10 @@ straight body (`kalman`). The changes over the horizon minimise the sum of e^2 +
 the force)^2, an unconstrained least-squares problem, whose first change is applied. The thrusters
 saturate it; the next period starts from what they did.
 
-Sources: E. F. Camacho, C. Bordons, Model Predictive Control, 2nd edition, 2007, chapter 2 (free and
-forced response); R. De Keyser, A. Cauwenberghe, Extended prediction self-adaptive control, IFAC
-Symposium on Identification and System Parameter Estimation 1985 (free response of another model).
+Sources: E. F. Camacho, C. Bordons, Model Predictive Control, 2nd edition, 2007 (free and forced
+response); R. M. C. De Keyser, A. R. Van Cauwenberghe, Extended prediction self-adaptive control,
+IFAC Symposium on Identification and System Parameter Estimation 1985 (free response of another
+model).
 """
 
 from __future__ import annotations
@@ -37,10 +38,9 @@ class MPCGains(NamedTuple):
     """Gains of the predictive controller.
 
     Attributes:
-        acceleration_noise: Spectral density of the noise on the acceleration, m/s^2 / sqrt(Hz).
-        disturbance_noise: Spectral density of the noise that drives the disturbance,
-            m/s^3 / sqrt(Hz).
-        variation_weight: Error that is as bad as a change of the force by 1 N in a period, m/N.
+        acceleration_noise: As in `lqg.LQGGains`.
+        disturbance_noise: As in `lqg.LQGGains`.
+        variation_weight: As in `lqg.LQGGains`.
         horizon: How far it looks ahead, s.
         heading_gain: k_psi, N m/rad.
     """

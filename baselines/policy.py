@@ -169,6 +169,16 @@ def act(observation, state, model, allocation, force, heading_gain, action):
             state[b, 1 + thrusters + j] = T[1, j]
 
 
+def signals_of(observation: NDArray[np.float32], state: Array, model: Model) -> Signals:
+    """The signals of a batch, from its observations and the shared part of its state."""
+    size = len(observation)
+    y, u, velocity, acceleration = np.empty((4, size, 2))
+    allocation = np.empty((size, 3, model.thruster_links.size))
+    signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
+    sense(state, model, signals)
+    return signals
+
+
 class ScriptedPolicy:
     """A control law behind `predict`; subclasses give `law_size`, `positive` and `force`.
 
@@ -262,10 +272,7 @@ class ScriptedPolicy:
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         size, thrusters = len(observation), self._thrusters
-        y, u, velocity, acceleration = np.empty((4, size, 2))
-        allocation = np.empty((size, 3, thrusters))
-        signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
-        sense(state, self._model, signals)
+        signals = signals_of(observation, state, self._model)
         law_state = self.law_state(state)
         force = self.force(signals, law_state)
         state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)
