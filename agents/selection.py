@@ -15,9 +15,10 @@ from agents.terminal import progress_bar
 from baselines.contender import Contender, contender
 from baselines.registry import entry, ids
 from baselines.scoring import BATCH, TIME_LIMIT, Refusal, Task, score_all, shared_nominal
+from usm_gym.conditions import Conditions
 from usm_gym.evaluation import Evaluation
 from usm_gym.robot import Robot
-from usm_gym.scenario import MODES, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import MODES, Mode, Scenario, sample
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.suites import NAMES, suite
 from usm_gym.validation import in_one_line, require

@@ -13,11 +13,12 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from usm_gym.conditions import Conditions, conditions_of
 from usm_gym.env import action_space, checked_action, infos, outcome, render_fps, scenario_of
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named
+from usm_gym.scenario import Mode, Scenario, named
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.validation import require
 from usm_gym.viewer import RENDER_MODES, Viewer

@@ -11,9 +11,10 @@ from typing import Any
 from agents.options import add_computing, computing, count, parse_conditions
 from agents.terminal import figures, output_console, progress_bar
 from baselines.gains import Budget
+from usm_gym.conditions import FIELD
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
-from usm_gym.scenario import FIELD, MODES
+from usm_gym.scenario import MODES
 from usm_gym.validation import require
 
 DESCRIPTION = """\

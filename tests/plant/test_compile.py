@@ -25,7 +25,8 @@ FLEET = """
 import hashlib
 import numpy as np
 from usm_gym import Robot
-from usm_gym.scenario import PRESETS, sample
+from usm_gym.conditions import PRESETS
+from usm_gym.scenario import sample
 from usm_gym.simulation import Simulation
 draw = np.random.default_rng(0)
 for size in (1, 3):
