@@ -174,19 +174,33 @@ def test_a_broken_file_gets_one_line_and_status_2(text, tmp_path, capsys):
     assert str(broken) in refused(capsys, "evaluate", "--suite", str(broken))
 
 
+WAITING = """
+import pathlib, time
+
+class Waiting:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        pathlib.Path("acting").touch()
+        time.sleep(60)
+"""
+
+
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
+    (tmp_path / "mine.py").write_text(WAITING)
     process = subprocess.Popen(
-        [USM, "evaluate", "--episodes", "3000", "--output", "result.json"],
+        [USM, "evaluate", "--policies", "mine:Waiting", "--output", "result.json"],
         cwd=tmp_path,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(5)
+    while not (tmp_path / "acting").exists():
+        assert process.poll() is None
+        time.sleep(0.01)
     os.kill(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert errors == "usm: interrupted\n"
-    assert list(tmp_path.iterdir()) == []
+    assert {file.name for file in tmp_path.iterdir()} == {"mine.py", "acting"}
 
 
 def test_a_closed_pipe_leaves_no_traceback():
