@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -58,11 +57,7 @@ A first look, in half a minute:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and leave with its status: 2 for bad input, 130 for Ctrl-C."""
-    parser = Parser(
-        prog="usm",
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = Parser(prog="usm", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:

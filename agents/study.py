@@ -18,9 +18,10 @@ from agents.training import CURVE, TEST_EPISODES, TEST_SEED, Plan, read_plan, tr
 from baselines.contender import Contender, contender
 from baselines.scoring import Refusal, Task, score_all, shared_nominal
 from usm_gym import parallel
+from usm_gym.conditions import FIELD, PRESETS, Conditions
 from usm_gym.evaluation import Evaluation
 from usm_gym.robot import Robot
-from usm_gym.scenario import FIELD, PRESETS, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.statistics import interquartile_mean, interval
 from usm_gym.validation import require

@@ -42,11 +42,12 @@ from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy
 from agents.residual_env import ResidualVectorEnv
 from agents.sb3_vec_env import SB3VecEnv
 from baselines.scoring import shared_nominal
+from usm_gym.conditions import FIELD, Conditions
 from usm_gym.evaluation import evaluate
 from usm_gym.files import write_json
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
-from usm_gym.scenario import FIELD, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.seeding import EVALUATION, TRAINING, VALIDATION, stream
 from usm_gym.validation import CONFIG, Count, Positive, in_one_line, require
 

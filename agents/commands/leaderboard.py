@@ -48,7 +48,6 @@ def add_to(subparsers: Any) -> None:
         help="score every policy on every suite",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_policies(parser, default="all, also slow and privileged ones")
     add_scoring(parser)

@@ -36,7 +36,6 @@ def add_to(subparsers: Any) -> None:
         help="train and compare agents",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("subject", choices=["residual"], help="what is studied")

@@ -45,7 +45,6 @@ def add_to(subparsers: Any) -> None:
         help="train an agent",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     for name, kind, metavar, text in OPTIONS:

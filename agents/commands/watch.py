@@ -8,7 +8,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents.selection import (
@@ -18,7 +17,7 @@ from agents.selection import (
     chosen_contenders,
     chosen_scenario,
 )
-from agents.terminal import mm, output_console, progress_bar
+from agents.terminal import empty_table, mm, output_console, progress_bar
 from usm_gym.evaluation import Trajectory, score
 from usm_gym.files import check_writable
 from usm_gym.validation import require
@@ -48,7 +47,6 @@ def add_to(subparsers: Any) -> None:
         help="see policies at work, in a window or a film",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_policies(parser, default="sta")
     add_scenarios(parser, single=True)
@@ -98,16 +96,11 @@ def run(arguments: argparse.Namespace) -> None:
 
 def table(trajectories: dict[str, Trajectory]) -> Table:
     """The errors of the episode in mm."""
-    rows = Table(
+    rows = empty_table(
         "policy",
+        numbers=("x", "y", "lost"),
         title="largest position error after settling, mm, in this episode",
-        title_justify="left",
-        title_style="",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
     )
-    for heading in ("x", "y", "lost"):
-        rows.add_column(heading, justify="right")
     for name, trajectory in trajectories.items():
         row = score(trajectory)
         errors = [mm(row[f"max_error_{axis}"]) for axis in "xy"]

@@ -10,9 +10,10 @@ import agents  # noqa: F401 (registers them)
 import baselines
 import usm_gym
 from agents.artifact import DESCRIPTION, PRETRAINED, read_agent
+from usm_gym.conditions import Conditions
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
-from usm_gym.scenario import Conditions, sample
+from usm_gym.scenario import sample
 from usm_gym.seeding import EVALUATION, stream
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]

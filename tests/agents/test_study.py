@@ -9,7 +9,7 @@ from agents import study, training
 from agents.dissection import lateness
 from agents.main import main
 from agents.study import PLANS, runs
-from usm_gym.scenario import FIELD
+from usm_gym.conditions import FIELD
 
 
 @pytest.fixture(autouse=True)
