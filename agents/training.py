@@ -15,7 +15,6 @@ import shlex
 import shutil
 import time
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -190,8 +189,7 @@ def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
     keeper = Keeper(plan, folder, envs, face, report)
     checkpoint = latest_checkpoint(folder)
     model = begin(plan, face) if checkpoint is None else keeper.resume(checkpoint)
-    formats = ["tensorboard"] if find_spec("tensorboard") else []
-    model.set_logger(configure(str(folder), formats))
+    model.set_logger(configure(str(folder), ["tensorboard"]))
     remaining = plan.steps - model.num_timesteps
     if remaining > 0:
         try:
@@ -307,6 +305,7 @@ class Keeper(BaseCallback):
         self.curve.append(point)
         for name, value in means.items():
             self.logger.record(f"validation/{name}", value)
+        self.logger.dump(self.num_timesteps)
         self._line = _line(point)
         self._report(self.num_timesteps, self._line)
         if self._best is None or _error(point) < _error(self._best[0]):

@@ -13,8 +13,8 @@ from usm_gym.validation import require
 
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
---policies takes, its learning curve on held-out scenarios of the training distribution, TensorBoard
-logs where TensorBoard is installed, and the last checkpoint. Frozen suites are never seen. The same
+--policies takes, its learning curve on held-out scenarios of the training distribution, logs for
+TensorBoard, and the last checkpoint. Frozen suites are never seen. The same
 command with --resume goes on from the last checkpoint. Needs the extra `agents`.
 """
 EXAMPLES = """\

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import usm_gym
 from agents import algorithms, training
@@ -83,6 +84,13 @@ def read_curve(folder):
         return json.loads((folder / training.CURVE).read_text())
     except FileNotFoundError:
         return []
+
+
+def test_the_log_has_the_metric_on_held_out_scenarios(tmp_path):
+    curve = train(PLAN, tmp_path, SILENT)
+    log = EventAccumulator(str(tmp_path)).Reload()
+    logged = [(each.step, each.value) for each in log.Scalars("validation/max_error_x")]
+    assert logged == [(each["steps"], np.float32(each["max_error_x"])) for each in curve]
 
 
 @pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
