@@ -23,7 +23,7 @@ Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 ActionKind = Literal["wrench", "thrusters"]
-RESIDUAL_SCALE = 6.0
+RESIDUAL_SCALE = 12.0
 
 
 class Memory(NamedTuple):

@@ -43,14 +43,14 @@ JOINT_REFERENCES = (
 
 # The agents that are shipped, each as its seed 0.
 AGENTS: dict[str, Plan] = {
-    "residual-ppo": Plan(steps=3_000_000),
+    "residual-ppo": Plan(steps=2_000_000),
     "residual-sta-tuned": Plan(base="sta-tuned", steps=1_000_000),
     "residual-pd": Plan(base="pd", steps=1_500_000),
-    "residual-lqg": Plan(base="lqg-tuned", steps=1_500_000),
+    "residual-lqg": Plan(base="lqg-tuned", residual_scale=6.0, steps=1_500_000),
     "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_000_000),
     # Without a base to correct, the agent has the whole limit of a thruster.
-    "rl-only": Plan(base="zero", residual_scale=20.0, steps=3_000_000),
-    "residual-sac": Plan(algorithm="sac", steps=400_000),
+    "rl-only": Plan(base="zero", residual_scale=20.0, steps=2_000_000),
+    "residual-sac": Plan(algorithm="sac", residual_scale=6.0, steps=400_000),
 }
 
 _SHORT = Plan(steps=1_000_000)
@@ -66,7 +66,8 @@ ABLATIONS: dict[str, Plan] = {
     "reference": _SHORT,
     "thrusters": replace(_SHORT, action="thrusters"),
     "scale-3": replace(_SHORT, residual_scale=3.0),
-    "scale-12": replace(_SHORT, residual_scale=12.0),
+    "scale-6": replace(_SHORT, residual_scale=6.0),
+    "scale-20": replace(_SHORT, residual_scale=20.0),
     "no-observer-states": replace(_SHORT, omit=OBSERVER_STATES),
     "no-kalman-states": replace(_SHORT, omit=KALMAN_STATES),
     "frames-not-kalman": replace(_SHORT, omit=KALMAN_STATES, frames=4),
