@@ -23,7 +23,8 @@ Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 ActionKind = Literal["wrench", "thrusters"]
-RESIDUAL_SCALE = 12.0
+# The limit of a thruster: less slows learning down, more buys error with chattering.
+RESIDUAL_SCALE = 20.0
 
 
 class Memory(NamedTuple):

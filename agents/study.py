@@ -46,11 +46,10 @@ AGENTS: dict[str, Plan] = {
     "residual-ppo": Plan(steps=2_000_000),
     "residual-sta-tuned": Plan(base="sta-tuned", steps=1_000_000),
     "residual-pd": Plan(base="pd", steps=1_500_000),
-    "residual-lqg": Plan(base="lqg-tuned", residual_scale=6.0, steps=1_500_000),
+    "residual-lqg": Plan(base="lqg-tuned", steps=1_500_000),
     "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_000_000),
-    # Without a base to correct, the agent has the whole limit of a thruster.
-    "rl-only": Plan(base="zero", residual_scale=20.0, steps=2_000_000),
-    "residual-sac": Plan(algorithm="sac", residual_scale=6.0, steps=400_000),
+    "rl-only": Plan(base="zero", steps=2_000_000),
+    "residual-sac": Plan(algorithm="sac", steps=250_000),
 }
 
 _SHORT = Plan(steps=1_000_000)
@@ -67,7 +66,8 @@ ABLATIONS: dict[str, Plan] = {
     "thrusters": replace(_SHORT, action="thrusters"),
     "scale-3": replace(_SHORT, residual_scale=3.0),
     "scale-6": replace(_SHORT, residual_scale=6.0),
-    "scale-20": replace(_SHORT, residual_scale=20.0),
+    "scale-12": replace(_SHORT, residual_scale=12.0),
+    "scale-40": replace(_SHORT, residual_scale=40.0),
     "no-observer-states": replace(_SHORT, omit=OBSERVER_STATES),
     "no-kalman-states": replace(_SHORT, omit=KALMAN_STATES),
     "frames-not-kalman": replace(_SHORT, omit=KALMAN_STATES, frames=4),
@@ -78,7 +78,7 @@ ABLATIONS: dict[str, Plan] = {
 }
 PLANS = AGENTS | ABLATIONS
 # Seeds of each training at most, so that all of it takes some hours on two cores.
-SEEDS = {name: 1 if name in ABLATIONS else 3 for name in PLANS} | {"residual-ppo": 5}
+SEEDS = {name: 1 if name in ABLATIONS else 2 for name in PLANS} | {"residual-ppo": 5}
 
 # Classical policies beside which the agents stand.
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")

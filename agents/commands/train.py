@@ -29,7 +29,7 @@ OPTIONS = (
     ("algorithm", str, "A", "ppo, sac, td3 or tqc (default: ppo)"),
     ("env", str, "ID", "residual task (default: agents:USM-OperationResidual-v0)"),
     ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
-    ("residual_scale", float, "N", "largest residual, N and N m (default: 12)"),
+    ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),
     ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
     ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of everything random (default: 0)"),
