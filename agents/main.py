@@ -14,6 +14,7 @@ from agents.commands import (
     evaluate,
     leaderboard,
     policies,
+    report,
     reproduce,
     robustness,
     train,
@@ -32,6 +33,7 @@ COMMANDS = (
     tune,
     train,
     watch,
+    report,
     reproduce,
     bench,
 )
@@ -46,6 +48,7 @@ A first look, in half a minute:
   usm leaderboard              all of them on all frozen suites
   usm robustness --vary noise  how they fare when something gets worse
   usm watch                    one of them at work
+  usm report RESULT.json       a page with all of it, to be played
   usm tune POLICY              better gains for one of them
   usm train --output DIR       an agent that adds thrust to one of them
   usm reproduce                the paper's Table 1 and figures

@@ -80,6 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
         output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))
     if arguments.output:
         document = {
+            "kind": "evaluation",
             "suite": name,
             "conditions": scenarios[0].to_dict()["conditions"],
             "conditions_override": arguments.conditions,

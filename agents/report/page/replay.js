@@ -1,0 +1,488 @@
+"use strict";
+
+// The look of the films (usm_gym/rendering.py).
+const METRES = 2.78; // width of the scene
+const JET_LENGTH = 0.36; // of a jet at the thruster's limit, m
+const LENS_PAST = 2; // how much of the past the lens shows, s
+const GRID = 0.5;
+const JETS = ["--jet", "--jet-core"];
+const DOTS = 0.04; // between the dots of the path, m
+const LINK = Array.from({ length: 28 }, (_, k) => {
+  const turn = (2 * Math.PI * k) / 28;
+  const root = (value, power) => Math.sign(value) * Math.abs(value) ** power;
+  return [root(Math.cos(turn), 0.45), root(Math.sin(turn), 0.6)];
+});
+const HEAD = LINK.map(([x, y], k) => {
+  const turn = (2 * Math.PI * k) / 28;
+  return Math.cos(turn) > 0 ? [1.35 * Math.cos(turn), Math.sin(turn)] : [x, y];
+});
+
+/** What `packed` of replay.py made: rows of numbers. */
+function unpacked({ shape, scale, data }) {
+  const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+  const view = new DataView(bytes.buffer);
+  const width = shape[1] ?? 1;
+  const value = (i) => scale * view.getInt16(2 * i, true);
+  return Array.from({ length: shape[0] }, (_, row) =>
+    Float64Array.from({ length: width }, (_, column) => value(row * width + column)));
+}
+
+/** Row of a table at a time, between two of them where `smooth`. */
+function rowAt(rows, place, smooth) {
+  const last = rows.length - 1;
+  const at = clamp(place, 0, last);
+  const before = Math.floor(at);
+  if (!smooth || before === last) return rows[before];
+  return rows[before].map((value, k) => value + (at - before) * (rows[before + 1][k] - value));
+}
+
+/** Centres of the links about a centre of mass, m. */
+function linkCentres(theta, length, [x, y]) {
+  const centres = [];
+  let [alongX, alongY] = [0, 0];
+  for (const angle of theta) {
+    const [dx, dy] = [Math.cos(angle) * length, Math.sin(angle) * length];
+    centres.push([alongX + dx / 2, alongY + dy / 2]);
+    [alongX, alongY] = [alongX + dx, alongY + dy];
+  }
+  const mean = [0, 1].map((k) => centres.reduce((sum, each) => sum + each[k], 0) / centres.length);
+  return centres.map((each) => [each[0] - mean[0] + x, each[1] - mean[1] + y]);
+}
+
+/** A round number, m, that errors up to `largest` fit into. */
+function roundScale(largest) {
+  const power = 10 ** Math.floor(Math.log10(largest || 1e-6));
+  return [1, 2, 5, 10].map((digit) => digit * power).find((scale) => scale >= 1.02 * largest) ?? 20 * power;
+}
+
+/** Fit a canvas to its place on the page; gives a context in CSS pixels. */
+function fitted(canvas, ratio) {
+  const width = canvas.clientWidth;
+  const height = Math.round(width * ratio);
+  const unit = devicePixelRatio;
+  if (canvas.width !== Math.round(width * unit) || canvas.height !== Math.round(height * unit)) {
+    canvas.width = Math.round(width * unit);
+    canvas.height = Math.round(height * unit);
+    canvas.style.height = `${height}px`;
+  }
+  const context = canvas.getContext("2d");
+  context.setTransform(unit, 0, 0, unit, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return { context, width, height };
+}
+
+function shape(context, points, fill, edge, width = 1) {
+  context.beginPath();
+  points.forEach(([x, y]) => context.lineTo(x, y));
+  context.closePath();
+  if (fill) { context.fillStyle = fill; context.fill(); }
+  if (edge) { context.strokeStyle = edge; context.lineWidth = width; context.stroke(); }
+}
+
+function line(context, points, colour, width) {
+  context.beginPath();
+  points.forEach(([x, y]) => context.lineTo(x, y));
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.stroke();
+}
+
+function disc(context, [x, y], radius, colour) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fillStyle = colour;
+  context.fill();
+}
+
+/** The usual sign: a disc in quarters. */
+function centreOfMass(context, [x, y], radius, ink, paper) {
+  disc(context, [x, y], radius + 1.2, ink);
+  disc(context, [x, y], radius, paper);
+  context.fillStyle = ink;
+  for (const start of [-0.5, 0.5]) {
+    context.beginPath();
+    context.moveTo(x, y);
+    context.arc(x, y, radius, start * Math.PI, (start + 0.5) * Math.PI);
+    context.fill();
+  }
+}
+
+/** A jet; a flow of length one is that at the thruster's limit. */
+function jet(context, [x, y], [flowX, flowY], breadth, metre) {
+  const strength = Math.hypot(flowX, flowY);
+  if (strength < 0.01) return;
+  const [aheadX, aheadY] = [JET_LENGTH * metre * flowX, JET_LENGTH * metre * flowY];
+  const half = (0.023 * metre * breadth) / strength;
+  const [acrossX, acrossY] = [-flowY * half, flowX * half];
+  [[1, 1], [0.7, 0.5]].forEach(([share, width], k) => {
+    const at = (ahead, across) =>
+      [x + ahead * share * aheadX + across * width * acrossX, y + ahead * share * aheadY + across * width * acrossY];
+    shape(context, [at(0, -0.5), at(0.9, -1), at(1, 0), at(0.9, 1), at(0, 0.5)], style(JETS[k]));
+  });
+}
+
+class Replay {
+  constructor(host) {
+    const data = JSON.parse(document.getElementById(`${host.dataset.replay}-data`).textContent);
+    this.host = host;
+    this.data = data;
+    this.path = unpacked(data.path);
+    this.current = data.current && unpacked(data.current);
+    this.reference = data.reference && unpacked(data.reference);
+    this.dots = this.pathDots();
+    this.known = {};
+    this.find = (name) => host.querySelector(name);
+    this.time = data.shifts.length ? Math.min(data.shifts[0] + 0.6, data.duration) : 0;
+    this.makeCharts();
+    this.listen();
+    this.choose();
+  }
+
+  /** The episode of a policy, unpacked when it is first asked for. */
+  episode(name) {
+    if (!name) return null;
+    if (!this.known[name]) {
+      const { theta, thrust, error, effort, lost } = this.data.episodes[name];
+      this.known[name] = {
+        name,
+        lost,
+        theta: unpacked(theta),
+        thrust: thrust && unpacked(thrust),
+        error: unpacked(error),
+        effort: unpacked(effort),
+      };
+    }
+    return this.known[name];
+  }
+
+  pathDots() {
+    const dots = [this.path[0]];
+    for (const point of this.path) {
+      const last = dots[dots.length - 1];
+      if (Math.hypot(point[0] - last[0], point[1] - last[1]) >= DOTS) dots.push(point);
+    }
+    return dots;
+  }
+
+  listen() {
+    const slider = this.find(".time");
+    slider.addEventListener("input", () => this.goTo(Number(slider.value)));
+    this.find(".play").addEventListener("click", () => this.play(!this.playing));
+    for (const name of [".pick-a", ".pick-b"]) {
+      this.find(name).addEventListener("change", () => this.choose());
+    }
+    new ResizeObserver(() => this.draw()).observe(this.host);
+  }
+
+  choose() {
+    this.a = this.episode(this.find(".pick-a").value);
+    this.b = this.episode(this.find(".pick-b").value);
+    const shown = [this.a, this.b].filter(Boolean);
+    const late = (_, k) => this.sampleTime(k) >= this.data.settle;
+    const largest = Math.max(...shown.flatMap(({ error }) =>
+      error.filter(late).map(([x, y]) => Math.hypot(x, y))), 1e-7);
+    this.scale = roundScale(largest);
+    this.fillCharts();
+    this.goTo(this.time);
+  }
+
+  sampleTime(index) {
+    return this.data.start + index * this.data.period;
+  }
+
+  /** Place in the samples of errors at a time. */
+  sample(time) {
+    return (time - this.data.start) / this.data.period;
+  }
+
+  goTo(time) {
+    this.time = clamp(time, 0, this.data.duration);
+    const slider = this.find(".time");
+    slider.value = this.time;
+    const clock = `${this.time.toFixed(2)} s`;
+    slider.setAttribute("aria-valuetext", clock);
+    this.find(".clock").textContent = clock;
+    this.draw();
+  }
+
+  play(on) {
+    const button = this.find(".play");
+    this.playing = on;
+    button.textContent = on ? "Pause" : "Play";
+    button.setAttribute("aria-pressed", on);
+    if (!on) return;
+    if (this.time >= this.data.duration) this.time = 0;
+    let last = performance.now();
+    const next = (now) => {
+      if (!this.playing) return;
+      const speed = Number(this.find(".speed").value);
+      this.goTo(this.time + (speed * (now - last)) / 1000);
+      last = now;
+      if (this.time >= this.data.duration) this.play(false);
+      else requestAnimationFrame(next);
+    };
+    requestAnimationFrame(next);
+  }
+
+  draw() {
+    this.drawScene();
+    this.drawLens();
+    this.writeErrors();
+    this.movePlayheads();
+  }
+
+  lostAt(episode, time) {
+    return episode.lost && this.sample(time) >= episode.error.length - 1;
+  }
+
+  drawScene() {
+    const { context, width, height } = fitted(this.find(".scene"), 0.43);
+    if (!width) return;
+    const place = this.time / this.data.frame;
+    const here = rowAt(this.path, place, true);
+    const metre = width / METRES;
+    const at = ([x, y]) => [width / 2 + (x - here[0]) * metre, height / 2 - (y - here[1]) * metre];
+    this.drawGrid(context, here, at, width / metre / 2, height / metre / 2);
+    const error = rowAt(this.a.error, this.sample(this.time), true);
+    const position = [here[0] + error[0], here[1] + error[1]];
+    const { length } = this.data.robot;
+    if (this.reference) {
+      const theta = rowAt(this.reference, place, true);
+      this.outlines(theta, linkCentres(theta, length, here)).forEach((link) =>
+        shape(context, link.map(at), null, style("--reference"), 1.5));
+    }
+    const theta = rowAt(this.a.theta, place, true);
+    const centres = linkCentres(theta, length, position);
+    if (this.a.thrust) this.drawJets(context, theta, centres, rowAt(this.a.thrust, place, false), metre, at);
+    this.drawBody(context, theta, centres, metre, at);
+    this.dots.forEach((dot) => disc(context, at(dot), 1.3, style("--ink")));
+    const trail = this.path.slice(0, Math.floor(place) + 1).map((point, k) => {
+      const past = rowAt(this.a.error, this.sample(k * this.data.frame), true);
+      return at([point[0] + past[0], point[1] + past[1]]);
+    });
+    line(context, [...trail, at(position)], style("--track"), 2.2);
+    centreOfMass(context, at(position), 6, style("--ink"), style("--surface"));
+    this.drawMeasures(context, width, height, metre, place);
+  }
+
+  outlines(theta, centres) {
+    const { length, halfWidth } = this.data.robot;
+    return centres.map((centre, k) => {
+      const [cos, sin] = [Math.cos(theta[k]), Math.sin(theta[k])];
+      return (k === centres.length - 1 ? HEAD : LINK).map(([x, y]) => {
+        const [along, across] = [0.485 * length * x, halfWidth * y];
+        return [centre[0] + along * cos - across * sin, centre[1] + along * sin + across * cos];
+      });
+    });
+  }
+
+  drawGrid(context, here, at, halfWidth, halfHeight) {
+    const [low, high] = [[here[0] - halfWidth, here[1] - halfHeight], [here[0] + halfWidth, here[1] + halfHeight]];
+    for (let x = Math.ceil(low[0] / GRID) * GRID; x < high[0]; x += GRID) {
+      line(context, [at([x, low[1]]), at([x, high[1]])], style("--grid"), 1);
+    }
+    for (let y = Math.ceil(low[1] / GRID) * GRID; y < high[1]; y += GRID) {
+      line(context, [at([low[0], y]), at([high[0], y])], style("--grid"), 1);
+    }
+  }
+
+  drawBody(context, theta, centres, metre, at) {
+    for (let k = 1; k < centres.length; k += 1) {
+      const joint = [0, 1].map((axis) => (centres[k - 1][axis] + centres[k][axis]) / 2);
+      disc(context, at(joint), 0.027 * metre, style("--body-edge"));
+    }
+    const links = this.outlines(theta, centres).map((link) => link.map(at));
+    const last = links.length - 1;
+    links.forEach((link, k) =>
+      shape(context, link, style(k === 0 ? "--tail" : k === last ? "--head" : "--body"), style(k === last ? "--head-edge" : "--body-edge")));
+    const [tip, neck] = [centres[last], centres[last - 1]];
+    const eye = [tip[0] + 0.45 * (tip[0] - neck[0]), tip[1] + 0.45 * (tip[1] - neck[1])];
+    disc(context, at(eye), 0.0136 * metre, style("--head-edge"));
+  }
+
+  /** Water leaves a thruster against its force, beside the body. */
+  drawJets(context, theta, centres, thrust, metre, at) {
+    this.data.robot.thrusters.forEach(({ link, normal }, k) => {
+      const [cos, sin] = [Math.cos(theta[link]), Math.sin(theta[link])];
+      const left = [-sin, cos];
+      const flow = (normal ? left : [cos, sin]).map((part) => -thrust[k] * part);
+      for (const side of normal ? [-Math.sign(thrust[k])] : [-1, 1]) {
+        const out = 0.9 * side * this.data.robot.halfWidth;
+        const start = [centres[link][0] + out * left[0], centres[link][1] + out * left[1]];
+        jet(context, at(start), [flow[0], -flow[1]], normal ? 1 : 0.6, metre);
+      }
+    });
+  }
+
+  drawMeasures(context, width, height, metre, place) {
+    const [right, bottom] = [width - 14, height - 10];
+    line(context, [[right - GRID * metre, bottom], [right, bottom]], style("--quiet"), 1.5);
+    context.fillStyle = style("--quiet");
+    context.font = "12px system-ui, sans-serif";
+    context.textAlign = "right";
+    context.fillText(`${GRID} m`, right, bottom - 5);
+    context.textAlign = "left";
+    if (this.current) {
+      const [x, y] = rowAt(this.current, place, true);
+      const speed = Math.hypot(x, y);
+      context.fillText(speed ? `current ${three(100 * speed)} cm/s` : "still water", speed ? 42 : 14, 22);
+      if (speed) this.drawArrow(context, [24, 18], [x / speed, -y / speed]);
+    }
+    if (this.lostAt(this.a, this.time)) {
+      context.fillStyle = style("--alarm");
+      context.font = "bold 14px system-ui, sans-serif";
+      context.fillText(`${this.a.name}: robot lost`, 14, 44);
+    }
+  }
+
+  drawArrow(context, [x, y], [aheadX, aheadY]) {
+    const at = (ahead, across) => [x + ahead * aheadX - across * aheadY, y + ahead * aheadY + across * aheadX];
+    line(context, [at(-10, 0), at(2, 0)], style("--current"), 2);
+    shape(context, [at(10, 0), at(1, 4.5), at(1, -4.5)], style("--current"));
+  }
+
+  /** The error of the centre of mass, magnified; the reference is in the middle. */
+  drawLens() {
+    const { context, width } = fitted(this.find(".lens"), 1);
+    if (!width) return;
+    const middle = [width / 2, width / 2];
+    const reach = 0.42 * width;
+    for (const share of [1, 0.5]) {
+      context.beginPath();
+      context.arc(...middle, share * reach, 0, 2 * Math.PI);
+      context.strokeStyle = style("--rule");
+      context.lineWidth = 1;
+      context.stroke();
+    }
+    line(context, [[middle[0] - reach, middle[1]], [middle[0] + reach, middle[1]]], style("--rule"), 1);
+    line(context, [[middle[0], middle[1] - reach], [middle[0], middle[1] + reach]], style("--rule"), 1);
+    const mark = ([x, y]) => {
+      const size = Math.max(Math.hypot(x, y) / this.scale, 1);
+      return [middle[0] + (reach * x) / this.scale / size, middle[1] - (reach * y) / this.scale / size];
+    };
+    disc(context, middle, 2.5, style("--reference"));
+    for (const [episode, colour] of [[this.b, "--b"], [this.a, "--a"]]) {
+      if (!episode) continue;
+      const last = clamp(Math.round(this.sample(this.time)), 0, episode.error.length - 1);
+      const first = Math.max(0, last - Math.round(LENS_PAST / this.data.period));
+      line(context, episode.error.slice(first, last + 1).map(mark), style(colour), 1.5);
+      centreOfMass(context, mark(episode.error[last]), 5, style(colour), style("--surface"));
+    }
+    const metre = this.find(".scene").clientWidth / METRES;
+    const times = three(reach / this.scale / metre);
+    this.find(".lens-scale").textContent =
+      `Error, ${times} times as large; the outer ring is ${three(1e3 * this.scale)} mm away.`;
+  }
+
+  writeErrors() {
+    for (const [name, episode] of [["a", this.a], ["b", this.b]]) {
+      const row = this.find(`.now tr.${name}`);
+      row.hidden = !episode;
+      if (!episode) continue;
+      const lost = this.lostAt(episode, this.time);
+      const error = rowAt(episode.error, this.sample(this.time), true);
+      row.cells[0].textContent = episode.name;
+      [0, 1].forEach((axis) => {
+        row.cells[axis + 1].textContent = lost ? "lost" : (1e3 * error[axis]).toFixed(3);
+      });
+    }
+  }
+
+  makeCharts() {
+    const host = this.find(".charts");
+    const tools = element("p", "bar tools");
+    this.readout = element("output", "readout");
+    host.append(tools);
+    const key = this.host.dataset.replay;
+    const hooks = {
+      drawClear: [(chart) => this.shade(chart)],
+      draw: [() => this.movePlayheads()],
+      setCursor: [(chart) => this.read(chart)],
+    };
+    const pair = [
+      { stroke: () => style("--a"), width: 1.5, points: { show: false } },
+      { stroke: () => style("--b"), width: 1.5, points: { show: false } },
+    ];
+    const parts = [["error in x, mm", 1], ["error in y, mm", 2], ["mean thrust, N", 3]];
+    this.charts = parts.map(([label]) => {
+      const panel = element("figure", "panel");
+      panel.append(element("figcaption", "caption", label));
+      host.append(panel);
+      const chart = makeChart(panel, {
+        label: `${label} against time`,
+        data: [[0], [0], [0]],
+        series: pair.map((each) => ({ ...each })),
+        log: { x: false, y: false },
+        xLabel: label.endsWith("N") ? "time, s" : undefined,
+        height: label.endsWith("N") ? 160 : 150,
+        zooms: ["x"],
+        more: { hooks, cursor: { sync: { key, scales: ["x", null] } } },
+      });
+      chart.playhead = element("div", "playhead");
+      chart.over.append(chart.playhead);
+      chart.over.addEventListener("click", () => {
+        if (chart.select.width === 0) this.goTo(chart.posToVal(chart.cursor.left, "x"));
+      });
+      return chart;
+    });
+    tools.append(element("span", "note", "Drag to zoom, click to go there."), makeZoomButtons(this.charts, "curves"), this.readout);
+  }
+
+  fillCharts() {
+    const length = Math.max(...[this.a, this.b].filter(Boolean).map(({ error }) => error.length));
+    const time = Array.from({ length }, (_, k) => this.sampleTime(k));
+    const column = (episode, value) =>
+      time.map((_, k) => (episode && k < episode.error.length ? value(episode, k) : null));
+    const values = [
+      (episode, k) => 1e3 * episode.error[k][0],
+      (episode, k) => 1e3 * episode.error[k][1],
+      (episode, k) => episode.effort[k]?.[0] ?? null,
+    ];
+    this.charts.forEach((chart, k) =>
+      chart.setData([time, column(this.a, values[k]), column(this.b, values[k])], true));
+  }
+
+  /** The time before settling, and the motions of the joints. */
+  shade(chart) {
+    const { ctx, bbox } = chart;
+    const pixel = (time) => clamp(chart.valToPos(time, "x", true), bbox.left, bbox.left + bbox.width);
+    ctx.save();
+    ctx.fillStyle = style("--grid");
+    ctx.fillRect(pixel(0), bbox.top, pixel(this.data.settle) - pixel(0), bbox.height);
+    ctx.strokeStyle = style("--head");
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.setLineDash([4 * devicePixelRatio, 4 * devicePixelRatio]);
+    for (const shift of this.data.shifts) {
+      const { min, max } = chart.scales.x;
+      if (shift < min || shift > max) continue;
+      ctx.beginPath();
+      ctx.moveTo(pixel(shift), bbox.top);
+      ctx.lineTo(pixel(shift), bbox.top + bbox.height);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  movePlayheads() {
+    for (const chart of this.charts ?? []) {
+      const left = chart.valToPos(this.time, "x");
+      chart.playhead.hidden = !(left >= 0 && left <= chart.over.clientWidth);
+      chart.playhead.style.transform = `translateX(${left}px)`;
+    }
+  }
+
+  /** Say what is under the cursor. */
+  read(chart) {
+    const { idx, left } = chart.cursor;
+    if (idx == null || left < 0) {
+      this.readout.textContent = "";
+      return;
+    }
+    const said = [`${chart.data[0][idx].toFixed(2)} s`];
+    [this.a, this.b].forEach((episode, k) => {
+      const [x, y, thrust] = this.charts.map(({ data }) => data[k + 1][idx]);
+      if (episode && x != null) said.push(`${episode.name}: ${three(x)}, ${three(y)} mm, ${thrust == null ? "–" : three(thrust)} N`);
+    });
+    this.readout.textContent = said.join(" · ");
+  }
+}
