@@ -74,7 +74,8 @@ def run(arguments: argparse.Namespace) -> None:
         if isinstance(outcome, Refusal):
             refused[task.contender.name] = outcome.reason
         else:
-            results[task.contender.name] = outcome.summary()
+            competitor = not task.contender.privileged
+            results[task.contender.name] = outcome.summary() | {"competitor": competitor}
     name = suite_name(arguments)
     if results:
         output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))

@@ -27,6 +27,7 @@ from baselines.contender import Contender
 from baselines.leaderboard import MAIN, suites
 from baselines.registry import entry, ids
 from baselines.reproduction import cases, run_case, side_by_side
+from usm_gym.metrics import RECOVERY
 from usm_gym.scenario import Scenario
 from usm_gym.validation import in_one_line, require
 
@@ -295,11 +296,7 @@ def pair(row: Row, score: str) -> str:
 
 def competitors(rows: Mapping[str, Row]) -> dict[str, Row]:
     """The rows of those that are told no more than a vehicle knows and lost no robot."""
-    return {
-        name: row
-        for name, row in rows.items()
-        if row.get("competitor", True) and row["failures"] == 0
-    }
+    return {name: row for name, row in rows.items() if row["competitor"] and row["failures"] == 0}
 
 
 def motion(rows: Mapping[str, Row]) -> str:
@@ -313,8 +310,8 @@ def motion(rows: Mapping[str, Row]) -> str:
 
     name, row = max(known.items(), key=lambda pair: total(pair[1]) / calm(pair[1]))
     return (
-        f"{name} strays by up to {pair(row, 'max_error')}, but only by "
-        f"{pair(row, 'settled_error')} outside the 7 s after each motion of the joints."
+        f"With {name} the error reaches {pair(row, 'max_error')}, but only "
+        f"{pair(row, 'settled_error')} outside the {RECOVERY:g} s after each motion of the joints."
     )
 
 
@@ -324,9 +321,12 @@ def verdict(rows: Mapping[str, Row], episodes: int) -> str:
     if not known:
         return ""
     best = min(known, key=lambda name: total(known[name]))
-    said = f"{best}: {pair(known[best], 'max_error')}, the largest error, mean of {episodes}."
+    said = (
+        f"The best, {best}, keeps it to {pair(known[best], 'max_error')}, mean of {episodes} "
+        "episodes."
+    )
     if PAPERS in rows and best != PAPERS:
-        said += f" The paper's {PAPERS}: {pair(rows[PAPERS], 'max_error')}."
+        said += f" The paper's {PAPERS} comes to {pair(rows[PAPERS], 'max_error')}."
     return said
 
 
@@ -337,6 +337,7 @@ def in_words(scenario: Scenario) -> str:
     if scenario.shifts:
         bends = zip(scenario.inspection.deflections, scenario.shifts, strict=True)
         listed = ", ".join(f"{angle:+.2f} rad at {time:.1f} s" for angle, time in bends)
+        listed = listed.replace("-", "−")
         parts.append(f"the last {scenario.inspection.bending_joints} joints bend by {listed}")
     current = (sum(each**2 for each in water.current)) ** 0.5
     parts.append(f"current {100 * current:.1f} cm/s")
@@ -350,14 +351,14 @@ def in_words(scenario: Scenario) -> str:
 def names() -> Facts:
     """What the names of the policies mean."""
     found = {id: entry(id).summary for id in ids() if not id.endswith("-tuned")}
-    found["…-tuned"] = "the same law with gains that `usm tune` has found on sampled scenarios"
+    found["…-tuned"] = "the same law with gains that usm tune has found on sampled scenarios"
     return Facts("What the names mean", found)
 
 
 def provenance(found: Row) -> Facts:
     """Where a result comes from."""
     packages = ", ".join(f"{name} {version}" for name, version in found["packages"].items())
-    seeds = json.dumps(found["seeds"])
+    seeds = "; ".join(f"{name}: {_listed(value)}" for name, value in found["seeds"].items())
     return Facts(
         "Where this comes from",
         {
@@ -367,3 +368,7 @@ def provenance(found: Row) -> Facts:
             "seeds": seeds,
         },
     )
+
+
+def _listed(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -18,12 +18,13 @@ def front(rows: Mapping[str, Row], weights: Mapping[str, Sequence[Row]]) -> Plot
         rows: Rows of the policies.
         weights: Points of policies that are tuned with other weights, by their id.
     """
+    besides = f" A line joins other weights of {', '.join(weights)}." if weights else ""
     panels = []
     for axis in "xy":
         points = [
             {"name": name, "x": row["thrust_variation"]["mean"], "y": row[error]["mean"] * 1e3}
             for name, row in rows.items()
-            if row.get("competitor", True) and row["thrust_variation"]["mean"] > 0
+            if row["competitor"] and row["thrust_variation"]["mean"] > 0
             for error in (f"max_error_{axis}",)
         ]
         lines = [
@@ -44,7 +45,7 @@ def front(rows: Mapping[str, Row], weights: Mapping[str, Sequence[Row]]) -> Plot
     return Plot(
         "Error against thrust variation",
         "A small error is easily bought with thrusters that chatter. Filled are the policies that "
-        "no other beats in both; left and below is better.",
+        f"no other beats in both; left and below is better.{besides}",
         {
             "kind": "points",
             "x": {"label": VARIATION, "log": True},

@@ -51,7 +51,7 @@ def score_table(rows: Mapping[str, Row], refused: Mapping[str, str]) -> Table:
     for name, row in rows.items():
         errors = [row[each] for each in ERRORS]
         halves = [float(interquartile_mean(row["per_episode"][each])) for each in ERRORS]
-        cells = [Cell(name, name, "" if row.get("competitor", True) else "no competitor")]
+        cells = [Cell(name, name, "" if row["competitor"] else "no competitor")]
         cells += [Cell(mm(each["mean"]), each["mean"], interval(each)) for each in errors]
         cells.append(Cell("", sum(each["mean"] for each in errors), marks=scale.marks(row)))
         cells += [length(each) for each in halves]

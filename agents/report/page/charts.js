@@ -22,11 +22,28 @@ function padded(low, high, log, share) {
     const factor = Math.max((high / low) ** share, 1.1);
     return [low / factor, high * factor];
   }
-  const room = (high - low) * share || Math.abs(high) || 1;
+  const room = high > low ? (high - low) * share : Math.abs(high) || 1;
   return [low - room, high + room];
 }
 
 const onScale = (scale) => (scale.distr === 3 ? [Math.log10, (power) => 10 ** power] : [Number, Number]);
+
+/** Marks of a logarithmic axis: the fewer decades are seen, the more. */
+function decadeMarks(low, high) {
+  const digits = high / low > 30 ? [1, 2, 5] : [1, 2, 3, 4, 5, 6, 7, 8, 9];
+  const marks = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
+    digits.forEach((digit) => marks.push(Number(`${digit}e${power}`)));
+  }
+  return marks.filter((mark) => mark >= low && mark <= high);
+}
+
+/** Which of these marks are labelled. */
+function decadeLabels(marks) {
+  const decades = Math.log10(marks[marks.length - 1] / marks[0]);
+  const digits = decades > 2 ? "1" : decades > 0.9 ? "125" : "123456789";
+  return marks.map((mark) => (digits.includes(mark.toExponential()[0]) ? three(mark) : ""));
+}
 
 /** Zoom about the cursor, or the middle, by a factor; Infinity shows all. */
 function zoom(chart, factor) {
@@ -96,8 +113,9 @@ function makeChart(host, { label, data, series, log, xLabel, height, zooms, more
     ticks: { show: false },
     font: "12px system-ui, sans-serif",
     labelFont: "12px system-ui, sans-serif",
-    values: (_, marks) => marks.map((mark) => (mark === null ? "" : three(mark))),
-    ...(key === "y" ? { size: 52 } : { size: 30, label: xLabel, labelSize: 20 }),
+    values: (_, marks) => (log[key] ? decadeLabels(marks) : marks.map(three)),
+    ...(log[key] && { splits: (_, __, low, high) => decadeMarks(low, high), filter: (_, marks) => marks }),
+    ...(key === "y" ? { size: 52, space: 26 } : { size: 30, label: xLabel, labelSize: 20 }),
   });
   const chart = new uPlot(
     {

@@ -70,6 +70,7 @@ function nameDots(chart, points) {
   const unit = devicePixelRatio;
   ctx.save();
   ctx.font = `${11.5 * unit}px system-ui, sans-serif`;
+  ctx.textAlign = "left";
   ctx.textBaseline = "middle";
   const place = ({ x, y }) => [chart.valToPos(x, "x", true), chart.valToPos(y, "y", true)];
   const dot = 6 * unit;

@@ -177,9 +177,9 @@ class Replay {
   choose() {
     this.a = this.episode(this.find(".pick-a").value);
     this.b = this.episode(this.find(".pick-b").value);
-    const shown = [this.a, this.b].filter(Boolean);
+    this.shown = [this.a, this.b].filter(Boolean);
     const late = (_, k) => this.sampleTime(k) >= this.data.settle;
-    const largest = Math.max(...shown.flatMap(({ error }) =>
+    const largest = Math.max(...this.shown.flatMap(({ error }) =>
       error.filter(late).map(([x, y]) => Math.hypot(x, y))), 1e-7);
     this.scale = roundScale(largest);
     this.fillCharts();
@@ -211,7 +211,7 @@ class Replay {
     button.textContent = on ? "Pause" : "Play";
     button.setAttribute("aria-pressed", on);
     if (!on) return;
-    if (this.time >= this.data.duration) this.time = 0;
+    if (this.time >= this.data.duration) this.goTo(0);
     let last = performance.now();
     const next = (now) => {
       if (!this.playing) return;
@@ -228,6 +228,7 @@ class Replay {
     this.drawScene();
     this.drawLens();
     this.writeErrors();
+    this.writeReadout();
     this.movePlayheads();
   }
 
@@ -400,9 +401,9 @@ class Replay {
       setCursor: [(chart) => this.read(chart)],
     };
     const pair = [
-      { stroke: () => style("--a"), width: 1.5, points: { show: false } },
       { stroke: () => style("--b"), width: 1.5, points: { show: false } },
-    ];
+      { stroke: () => style("--a"), width: 1.5, points: { show: false } },
+    ]; // the controller itself is drawn on top of the other
     const parts = [["error in x, mm", 1], ["error in y, mm", 2], ["mean thrust, N", 3]];
     this.charts = parts.map(([label]) => {
       const panel = element("figure", "panel");
@@ -414,7 +415,7 @@ class Replay {
         series: pair.map((each) => ({ ...each })),
         log: { x: false, y: false },
         xLabel: label.endsWith("N") ? "time, s" : undefined,
-        height: label.endsWith("N") ? 160 : 150,
+        height: label.endsWith("N") ? 190 : 170,
         zooms: ["x"],
         more: { hooks, cursor: { sync: { key, scales: ["x", null] } } },
       });
@@ -429,7 +430,7 @@ class Replay {
   }
 
   fillCharts() {
-    const length = Math.max(...[this.a, this.b].filter(Boolean).map(({ error }) => error.length));
+    const length = Math.max(...this.shown.map(({ error }) => error.length));
     const time = Array.from({ length }, (_, k) => this.sampleTime(k));
     const column = (episode, value) =>
       time.map((_, k) => (episode && k < episode.error.length ? value(episode, k) : null));
@@ -439,7 +440,7 @@ class Replay {
       (episode, k) => episode.effort[k]?.[0] ?? null,
     ];
     this.charts.forEach((chart, k) =>
-      chart.setData([time, column(this.a, values[k]), column(this.b, values[k])], true));
+      chart.setData([time, column(this.b, values[k]), column(this.a, values[k])], true));
   }
 
   /** The time before settling, and the motions of the joints. */
@@ -471,18 +472,20 @@ class Replay {
     }
   }
 
-  /** Say what is under the cursor. */
+  /** Say what is under the cursor, or else what is now. */
   read(chart) {
     const { idx, left } = chart.cursor;
-    if (idx == null || left < 0) {
-      this.readout.textContent = "";
-      return;
-    }
-    const said = [`${chart.data[0][idx].toFixed(2)} s`];
-    [this.a, this.b].forEach((episode, k) => {
-      const [x, y, thrust] = this.charts.map(({ data }) => data[k + 1][idx]);
-      if (episode && x != null) said.push(`${episode.name}: ${three(x)}, ${three(y)} mm, ${thrust == null ? "–" : three(thrust)} N`);
+    this.pointed = idx != null && left >= 0 ? idx : null;
+    this.writeReadout();
+  }
+
+  writeReadout() {
+    const index = this.pointed ?? Math.max(Math.round(this.sample(this.time)), 0);
+    const said = this.shown.filter(({ error }) => index < error.length).map((episode) => {
+      const [x, y] = episode.error[index].map((error) => three(1e3 * error));
+      const thrust = episode.effort[index];
+      return `${episode.name} ${x}, ${y} mm${thrust ? `, ${three(thrust[0])} N` : ""}`;
     });
-    this.readout.textContent = said.join(" · ");
+    this.readout.textContent = [`${this.sampleTime(index).toFixed(2)} s`, ...said].join(" · ");
   }
 }
