@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.progress import Progress, TaskID
 
-from agents.options import count
+from agents.options import add_computing, computing, count
 from agents.selection import POLICIES, chosen_contenders
 from agents.terminal import output_console, progress_bar
 from usm_gym.files import check_writable, write_text
@@ -49,6 +49,7 @@ def add_to(subparsers: Any) -> None:
         help="which to replay (default: those of the result, but no code of your own)",
     )
     add("--scenario", type=int, metavar="I", help="which episode to replay, from 0 on (default: 0)")
+    add_computing(parser)
     parser.set_defaults(run=run)
 
 
@@ -62,16 +63,14 @@ def run(arguments: argparse.Namespace) -> None:
 
     path = Path(arguments.output)
     check_writable(path)
-    named = arguments.policies is not None
-    choice = Choice(
-        chosen_contenders(arguments.policies) if named else None,
-        count(arguments, "scenario", 0, least=0),
-    )
+    contenders = None if arguments.policies is None else chosen_contenders(arguments.policies)
+    scenario = count(arguments, "scenario", 0, least=0)
     files = [Path(name) for name in arguments.results]
     for file in files:
         read(file)  # refuses what is no result before anything is computed
     chapters = []
-    with progress_bar() as bar:
+    with computing(arguments) as workers, progress_bar() as bar:
+        choice = Choice(contenders, scenario, workers)
         for file in files:
             line = bar.add_task(f"replay {file.name}")
             chapters.append(chapter(file, choice, partial(advance, bar, line)))

@@ -29,6 +29,7 @@ from baselines.registry import entry, ids
 from baselines.reproduction import cases, run_case, side_by_side
 from usm_gym.metrics import RECOVERY
 from usm_gym.scenario import Scenario
+from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.validation import in_one_line, require
 
 Document = Mapping[str, Any]
@@ -49,15 +50,17 @@ CONDITIONS = (
 
 @dataclass(frozen=True)
 class Choice:
-    """What is replayed.
+    """What is replayed, and on what.
 
     Attributes:
         policies: The policies; None means those of the result.
         scenario: Which of the result's scenarios, from 0 on.
+        workers: Number of processes.
     """
 
-    policies: Sequence[Contender] | None
-    scenario: int
+    policies: Sequence[Contender] | None = None
+    scenario: int = 0
+    workers: int = 1
 
 
 def read(path: Path) -> Document:
@@ -159,9 +162,10 @@ def robustness(result: Document, choice: Choice, progress: Progress) -> Chapter:
             plots.robustness(curves, label),
             Tables(
                 "Errors",
-                "Largest position error after settling: mean with its 95 % interval.",
+                "Largest position error after settling, mm: mean with its 95 % interval, by "
+                f"{label}.",
                 "quantity",
-                {label: curve_table(curves, label)},
+                {label: curve_table(curves)},
             ),
             replay(scenarios, {name: {} for name in curves}, choice, progress),
             Tables(
@@ -241,7 +245,7 @@ def replay(
         done += 1
         progress(done, len(contenders))
 
-    episodes = replayed(contenders, scenario, advance)
+    episodes = replayed(contenders, scenario, choice.workers, advance)
     missing |= episodes.missing
     title = f"Episode {index}, replayed"
     shown = list(episodes.data["episodes"])
@@ -323,7 +327,7 @@ def verdict(rows: Mapping[str, Row], episodes: int) -> str:
     best = min(known, key=lambda name: total(known[name]))
     said = (
         f"The best, {best}, keeps it to {pair(known[best], 'max_error')}, mean of {episodes} "
-        "episodes."
+        f"episodes{'' if episodes >= FEWEST_EPISODES else ', too few for a conclusion'}."
     )
     if PAPERS in rows and best != PAPERS:
         said += f" The paper's {PAPERS} comes to {pair(rows[PAPERS], 'max_error')}."

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.take import Take, instants, take
+from agents.take import instants, take
 from baselines.contender import Contender
 from baselines.paper_rate import Record
+from usm_gym import parallel
 from usm_gym.evaluation import score
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
@@ -26,6 +27,23 @@ RECORD_PERIOD = 0.01
 INT16 = 32767
 # Scores that differ by more than this share are not those of the result.
 TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Acted:
+    """What a policy did.
+
+    Attributes:
+        data: What the page plays of it.
+        reference: Link angles of the reference posture at each picture, rad, (pictures, links).
+        current: Velocity of the water at each picture, m/s, (pictures, 2).
+        max_error: Largest error after settling, m, x and y.
+    """
+
+    data: dict[str, Any]
+    reference: Array
+    current: Array
+    max_error: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -52,39 +70,70 @@ def packed(values: Array) -> dict[str, Any]:
 
 
 def replayed(
-    contenders: Sequence[Contender], scenario: Scenario, progress: Callable[[], object]
+    contenders: Sequence[Contender],
+    scenario: Scenario,
+    workers: int,
+    progress: Callable[[], object],
 ) -> Episodes:
     """Let policies act in a scenario.
 
     Args:
         contenders: The policies.
         scenario: The scenario.
+        workers: Number of processes.
         progress: Called after each of them.
 
     Returns:
         What they did; nobody's if none of them acts.
     """
-    shown = instants(scenario, FPS, 1.0)
-    takes: list[Take] = []
-    missing: dict[str, str] = {}
-    for contender in contenders:
-        try:
-            takes.append(take(contender, scenario, shown))
-        except ValueError as error:
-            missing[contender.name] = str(error)
+    done: dict[int, Acted | str] = {}
+    tasks = [(contender, scenario) for contender in contenders]
+    for index, outcome in parallel.results(act, tasks, workers):
+        done[index] = outcome
         progress()
-    if not takes:
+    acted: dict[str, Acted] = {}
+    missing: dict[str, str] = {}
+    for index, contender in enumerate(contenders):
+        outcome = done[index]
+        if isinstance(outcome, str):
+            missing[contender.name] = outcome
+        else:
+            acted[contender.name] = outcome
+    if not acted:
         return Episodes({"episodes": {}}, {}, missing)
-    longest = max(takes, key=lambda each: len(each.pictures)).pictures
+    longest = max(acted.values(), key=lambda each: len(each.reference))
     period = scenario.conditions.control_period
-    data = frame(scenario, longest[0].robot, longest[0].path[shown]) | {
+    shown = instants(scenario, FPS, 1.0)
+    data = frame(scenario, Robot(), scenario.reference_positions()[shown]) | {
         "start": period,
         "period": period,
-        "current": packed(np.array([each.current for each in longest])),
-        "reference": packed(np.array([each.reference.angles for each in longest])),
-        "episodes": {each.name: _episode(each) for each in takes},
+        "current": packed(longest.current),
+        "reference": packed(longest.reference),
+        "episodes": {name: each.data for name, each in acted.items()},
     }
-    return Episodes(data, {each.name: _max_error(each) for each in takes}, missing)
+    return Episodes(data, {name: each.max_error for name, each in acted.items()}, missing)
+
+
+def act(contender: Contender, scenario: Scenario) -> Acted | str:
+    """Let a policy act in a scenario; or why it cannot."""
+    try:
+        found = take(contender, scenario, instants(scenario, FPS, 1.0))
+    except ValueError as error:
+        return str(error)
+    pictures, row = found.pictures, score(found.trajectory)
+    data = {
+        "theta": packed(np.array([each.body.angles for each in pictures])),
+        "thrust": packed(np.array([each.thrust for each in pictures])),
+        "error": packed(pictures[-1].errors[1:]),
+        "effort": packed(np.abs(found.trajectory.command).mean(axis=1)),
+        "lost": found.trajectory.lost,
+    }
+    return Acted(
+        data,
+        np.array([each.reference.angles for each in pictures]),
+        np.array([each.current for each in pictures]),
+        (float(row["max_error_x"]), float(row["max_error_y"])),
+    )
 
 
 def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any]:
@@ -139,18 +188,3 @@ def differing(
         for name, errors in expected.items()
         if not np.allclose(found[name], errors, rtol=TOLERANCE, atol=0.0)
     ]
-
-
-def _episode(each: Take) -> dict[str, Any]:
-    return {
-        "theta": packed(np.array([picture.body.angles for picture in each.pictures])),
-        "thrust": packed(np.array([picture.thrust for picture in each.pictures])),
-        "error": packed(each.pictures[-1].errors[1:]),
-        "effort": packed(np.abs(each.trajectory.command).mean(axis=1)),
-        "lost": each.trajectory.lost,
-    }
-
-
-def _max_error(each: Take) -> tuple[float, float]:
-    found = score(each.trajectory)
-    return float(found["max_error_x"]), float(found["max_error_y"])

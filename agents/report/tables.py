@@ -66,7 +66,7 @@ def score_table(rows: Mapping[str, Row], refused: Mapping[str, str]) -> Table:
     return Table(columns, body, [f"{name} is refused: {why}" for name, why in refused.items()])
 
 
-def curve_table(curves: Mapping[str, Sequence[Row]], label: str) -> Table:
+def curve_table(curves: Mapping[str, Sequence[Row]]) -> Table:
     """Mean errors at each value of a quantity, a row for each policy and axis."""
     values = [point["value"] for point in next(iter(curves.values()))]
     body = []
@@ -86,8 +86,8 @@ def curve_table(curves: Mapping[str, Sequence[Row]], label: str) -> Table:
         for point in points
         if "refused" in point
     ]
-    titles = [Column(f"error, mm, at {value:g}") for value in values]
-    return Table([Column(f"policy; {label}"), *titles], body, notes)
+    titles = [Column(f"at {value:g}") for value in values]
+    return Table([Column("policy, axis"), *titles], body, notes)
 
 
 def paper_table(rows: Mapping[str, Row], paper: Mapping[str, Row]) -> Table:

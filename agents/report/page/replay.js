@@ -210,6 +210,7 @@ class Replay {
     this.playing = on;
     button.textContent = on ? "Pause" : "Play";
     button.setAttribute("aria-pressed", on);
+    this.readout.setAttribute("aria-live", on ? "off" : "polite");
     if (!on) return;
     if (this.time >= this.data.duration) this.goTo(0);
     let last = performance.now();
@@ -381,7 +382,7 @@ class Replay {
       row.hidden = !episode;
       if (!episode) continue;
       const lost = this.lostAt(episode, this.time);
-      const error = rowAt(episode.error, this.sample(this.time), true);
+      const error = rowAt(episode.error, Math.round(this.sample(this.time)), false);
       row.cells[0].textContent = episode.name;
       [0, 1].forEach((axis) => {
         row.cells[axis + 1].textContent = lost ? "lost" : (1e3 * error[axis]).toFixed(3);
