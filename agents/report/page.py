@@ -17,6 +17,7 @@ SCRIPTS = (
     "page/tables.js",
     "page/charts.js",
     "page/plots.js",
+    "page/drawing.js",
     "page/replay.js",
     "page/page.js",
 )

@@ -321,7 +321,10 @@ def test_plots_zoom_and_tell_by_keys(browser, folder, varied):
     chart.send_keys("\ue014\ue014")  # right
     assert find(browser, ".tools .readout").text != before
     chart.send_keys("+")
-    assert browser.execute_script(limits) == pytest.approx(whole / 2)
+    for k in range(3):  # the curves over time share their axis
+        assert browser.execute_script(limits.replace("[0].s", f"[{k}].s")) == pytest.approx(
+            whole / 2
+        )
     chart.send_keys("0")
     assert browser.execute_script(limits) == pytest.approx(whole)
     find(browser, ".tools .zoom button").send_keys("\ue007")  # enter

@@ -45,26 +45,25 @@ function decadeLabels(marks) {
   return marks.map((mark) => (digits.includes(mark.toExponential()[0]) ? three(mark) : ""));
 }
 
-/** Zoom about the cursor, or the middle, by a factor; Infinity shows all. */
+/** Zoom a chart, and those that share its x axis, about its cursor or middle; Infinity shows all. */
 function zoom(chart, factor) {
   if (factor === Infinity) {
-    chart.setData(chart.data, true);
+    chart.group.forEach((each) => each.setData(each.data, true));
     return;
   }
   const { left, top } = chart.cursor;
-  chart.batch(() => {
-    for (const key of chart.zooms) {
-      const scale = chart.scales[key];
-      const [to, from] = onScale(scale);
-      const [low, high] = [to(scale.min), to(scale.max)];
-      const place = key === "x" ? left : top;
-      const centre = place >= 0 ? to(chart.posToVal(place, key)) : (low + high) / 2;
-      chart.setScale(key, {
-        min: from(centre - (centre - low) * factor),
-        max: from(centre + (high - centre) * factor),
-      });
-    }
-  });
+  for (const key of chart.zooms) {
+    const scale = chart.scales[key];
+    const [to, from] = onScale(scale);
+    const [low, high] = [to(scale.min), to(scale.max)];
+    const place = key === "x" ? left : top;
+    const centre = place >= 0 ? to(chart.posToVal(place, key)) : (low + high) / 2;
+    const limits = {
+      min: from(centre - (centre - low) * factor),
+      max: from(centre + (high - centre) * factor),
+    };
+    chart.group.forEach((each) => each.setScale(key, limits));
+  }
 }
 
 /** Move the cursor to the next datum in x that is seen. */
@@ -75,8 +74,10 @@ function step(chart, by) {
   let index = chart.cursor.idx ?? (by > 0 ? -1 : x.length);
   do index += by; while (index >= 0 && index < x.length && !seen(index));
   if (index < 0 || index >= x.length) return;
-  const y = series.map((values) => values[index]).find((value) => value != null);
-  chart.setCursor({ left: chart.valToPos(x[index], "x"), top: chart.valToPos(y, "y") });
+  for (const each of chart.group) {
+    const y = each.data.slice(1).map((values) => values[index]).find((value) => value != null);
+    each.setCursor({ left: each.valToPos(x[index], "x"), top: each.valToPos(y, "y") });
+  }
 }
 
 const KEYS = {
@@ -131,7 +132,7 @@ function makeChart(host, { label, data, series, log, xLabel, height, zooms, more
       ...more,
       cursor: {
         drag: { x: true, y: zooms.length > 1, uni: 20 },
-        points: { size: 8 },
+        points: { size: 11, width: 2, stroke: () => style("--ink"), fill: "transparent" },
         ...more.cursor,
       },
     },
@@ -139,12 +140,15 @@ function makeChart(host, { label, data, series, log, xLabel, height, zooms, more
     frame
   );
   chart.zooms = zooms;
+  chart.group = [chart];
   frame.addEventListener("keydown", (event) => {
     const act = KEYS[event.key];
     if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     act(chart, event.shiftKey);
   });
+  frame.addEventListener("blur", () =>
+    chart.group.forEach((each) => each.setCursor({ left: -10, top: -10 })));
   new ResizeObserver(() => {
     if (host.clientWidth > 0) chart.setSize({ width: host.clientWidth, height });
   }).observe(host);
@@ -152,8 +156,8 @@ function makeChart(host, { label, data, series, log, xLabel, height, zooms, more
   return chart;
 }
 
-/** Buttons that zoom charts, for those without a mouse. */
-function makeZoomButtons(found, label) {
+/** Buttons that zoom a chart, for those without a mouse. */
+function makeZoomButtons(chart, label) {
   const bar = document.createElement("span");
   bar.className = "zoom";
   const actions = [["+", "Zoom in", 0.5], ["−", "Zoom out", 2], ["All", "Show all", Infinity]];
@@ -162,7 +166,7 @@ function makeZoomButtons(found, label) {
     button.type = "button";
     button.textContent = text;
     button.setAttribute("aria-label", `${name}: ${label}`);
-    button.addEventListener("click", () => found.forEach((chart) => zoom(chart, factor)));
+    button.addEventListener("click", () => zoom(chart, factor));
     bar.append(button);
   }
   return bar;

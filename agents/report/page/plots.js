@@ -61,7 +61,7 @@ function drawPoints(host, data, { label, points, lines }) {
       },
     },
   });
-  caption.append(makeZoomButtons([chart], label));
+  caption.append(makeZoomButtons(chart, label));
 }
 
 /** Write the names of points where there is room; those on the front come first. */
@@ -125,7 +125,7 @@ function drawCurves(host, data, { label, series }, legend) {
       },
     },
   });
-  caption.append(makeZoomButtons([chart], label));
+  caption.append(makeZoomButtons(chart, label));
   legend.forEach((box, k) => box.addEventListener("change", () => {
     chart.batch(() => [1, 2, 3].forEach((part) => chart.setSeries(3 * k + part, { show: box.checked })));
   }));
