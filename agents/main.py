@@ -13,6 +13,7 @@ from agents.commands import (
     evaluate,
     leaderboard,
     policies,
+    report,
     reproduce,
     robustness,
     study,
@@ -33,6 +34,7 @@ COMMANDS = (
     train,
     study,
     watch,
+    report,
     reproduce,
     bench,
 )
@@ -47,6 +49,7 @@ A first look, in half a minute:
   usm leaderboard              all of them on all frozen suites
   usm robustness --vary noise  how they fare when something gets worse
   usm watch                    one of them at work
+  usm report RESULT.json       a page with all of it, to be played
   usm tune POLICY              better gains for one of them
   usm train --output DIR       an agent that adds thrust to one of them
   usm study residual           what trained agents owe to what

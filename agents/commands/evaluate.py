@@ -67,12 +67,17 @@ def run(arguments: argparse.Namespace) -> None:
     scenarios = chosen_scenarios(arguments)
     chosen = tasks(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
     found, refused = by_name(chosen, scored(chosen, arguments))
-    results = {name: evaluation.summary() for name, evaluation in found.items()}
+    privileged = {task.contender.name for task in chosen if task.contender.privileged}
+    results = {
+        name: evaluation.summary() | {"competitor": name not in privileged}
+        for name, evaluation in found.items()
+    }
     name = suite_name(arguments)
     if results:
         output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))
     if arguments.output:
         document = {
+            "kind": "evaluation",
             "suite": name,
             "conditions": scenarios[0].to_dict()["conditions"],
             "conditions_override": arguments.conditions,

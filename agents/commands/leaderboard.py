@@ -69,6 +69,7 @@ def run(arguments: argparse.Namespace) -> None:
     chosen = cells(contenders, fronts, suites(), arguments.time_limit)
     outcomes = scored([cell.task for cell in chosen], arguments, folder / "cache")
     found = {
+        "kind": "leaderboard",
         "version": version("usm-gym"),
         **document(list(zip(chosen, outcomes, strict=True)), fronts),
         "provenance": provenance({"suites": list(NAMES)}),

@@ -95,6 +95,7 @@ def run_table(folder: Path | None, step: float, names: list[str]) -> None:
         return
     scenario: dict[str, Scenario] = {mode: named("table1", mode) for mode in MODES}
     document = {
+        "kind": "reproduction",
         "step": step,
         "settle_time": scenario["operation"].settle_time,
         **result,

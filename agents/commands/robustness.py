@@ -73,6 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
     outcomes = scored(chosen, arguments, folder / "cache")
     found = robustness.curves([each.name for each in contenders], values, outcomes)
     document = {
+        "kind": "robustness",
         "quantity": arguments.vary,
         "label": quantity.label,
         "values": list(values),

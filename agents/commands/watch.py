@@ -17,6 +17,7 @@ from agents.selection import (
     chosen_contenders,
     chosen_scenario,
 )
+from agents.take import instants, take
 from agents.terminal import empty_table, mm, output_console, progress_bar
 from usm_gym.evaluation import Trajectory, score
 from usm_gym.files import check_writable
@@ -78,11 +79,11 @@ def run(arguments: argparse.Namespace) -> None:
     require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
     scenario = chosen_scenario(arguments)
     fps = film.FPS[medium]
-    shown = film.instants(scenario, fps, speed)
+    shown = instants(scenario, fps, speed)
     with progress_bar() as bar:
         line = bar.add_task("simulate", total=len(contenders))
         takes = [
-            film.take(each, scenario, shown, lambda episodes: bar.advance(line, episodes))
+            take(each, scenario, shown, lambda episodes: bar.advance(line, episodes))
             for each in contenders
         ]
         made = film.Film(takes, len(shown), film.WIDTHS[medium][len(takes) - 1])

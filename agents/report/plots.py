@@ -1,0 +1,95 @@
+"""The plots of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from agents.report.blocks import Plot
+from agents.report.tables import Row
+
+VARIATION = "thrust variation, N/s"
+
+
+def front(rows: Mapping[str, Row], weights: Mapping[str, Sequence[Row]]) -> Plot:
+    """Error against thrust variation, and which policies no other beats in both.
+
+    Args:
+        rows: Rows of the policies.
+        weights: Points of policies that are tuned with other weights, by their id.
+    """
+    besides = f" A line joins other weights of {', '.join(weights)}." if weights else ""
+    panels = []
+    for axis in "xy":
+        points = [
+            {"name": name, "x": row["thrust_variation"]["mean"], "y": row[error]["mean"] * 1e3}
+            for name, row in rows.items()
+            if row["competitor"] and row["thrust_variation"]["mean"] > 0
+            for error in (f"max_error_{axis}",)
+        ]
+        lines = [
+            {
+                "name": f"{name}, other weights",
+                "x": [point["thrust_variation"] for point in listed],
+                "y": [1e3 * point[f"max_error_{axis}"] for point in listed],
+            }
+            for name, listed in weights.items()
+        ]
+        panels.append(
+            {
+                "label": f"error in {axis}, mm",
+                "points": [point | {"front": not beaten(point, points)} for point in points],
+                "lines": lines,
+            }
+        )
+    return Plot(
+        "Error against thrust variation",
+        "A small error is easily bought with thrusters that chatter. Filled are the policies that "
+        f"no other beats in both; left and below is better.{besides}",
+        {
+            "kind": "points",
+            "x": {"label": VARIATION, "log": True},
+            "y": {"log": True},
+            "panels": panels,
+        },
+    )
+
+
+def beaten(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether another point is better in one coordinate and no worse in the other."""
+    here = point["x"], point["y"]
+    return any(
+        each["x"] <= here[0] and each["y"] <= here[1] and (each["x"], each["y"]) != here
+        for each in points
+    )
+
+
+def robustness(curves: Mapping[str, Sequence[Row]], label: str) -> Plot:
+    """Error against a quantity, with intervals."""
+    panels = []
+    for axis in "xy":
+        series = []
+        for name, points in curves.items():
+            known = [point.get(f"max_error_{axis}") for point in points]
+            low, mean, high = (
+                [None if each is None else 1e3 * value(each) for each in known]
+                for value in (
+                    lambda score: score["ci95"][0],
+                    lambda score: score["mean"],
+                    lambda score: score["ci95"][1],
+                )
+            )
+            values = [point["value"] for point in points]
+            series.append({"name": name, "x": values, "y": mean, "low": low, "high": high})
+        panels.append({"label": f"error in {axis}, mm", "series": series})
+    return Plot(
+        "Error curves",
+        "Largest position error after settling, mean over the episodes; shaded is its 95 % "
+        "interval.",
+        {
+            "kind": "curves",
+            "x": {"label": label, "log": False},
+            "y": {"log": True},
+            "panels": panels,
+        },
+    )
