@@ -125,10 +125,12 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
     episodes = count(arguments, "episodes", 50)
     seed = count(arguments, "seed", 0, least=0)
     mode: Mode = arguments.mode or "operation"
-    return [
-        sample(mode, conditions or Conditions(), stream(seed, EVALUATION, i))
-        for i in range(episodes)
-    ]
+    return unseen(mode, conditions or Conditions(), seed, episodes)
+
+
+def unseen(mode: Mode, conditions: Conditions, seed: int, episodes: int) -> list[Scenario]:
+    """Scenarios sampled under a seed, which no training and no tuning ever meets."""
+    return [sample(mode, conditions, stream(seed, EVALUATION, i)) for i in range(episodes)]
 
 
 def chosen_scenario(arguments: argparse.Namespace) -> Scenario:

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from agents.artifact import agent_contender, make_agent
 from agents.dissection import dissect
+from agents.selection import unseen
 from agents.training import CURVE, TEST_EPISODES, TEST_SEED, Plan, read_plan, train
 from baselines.contender import Contender, contender
 from baselines.scoring import Refusal, Task, score_all, shared_nominal
 from usm_gym import parallel
 from usm_gym.conditions import FIELD, PRESETS, Conditions
-from usm_gym.evaluation import Evaluation
+from usm_gym.evaluation import Evaluation, joined
 from usm_gym.robot import Robot
-from usm_gym.scenario import Mode, Scenario, sample
-from usm_gym.seeding import EVALUATION, stream
+from usm_gym.scenario import Mode
 from usm_gym.statistics import interquartile_mean, interval
 from usm_gym.validation import require
 
@@ -92,7 +92,14 @@ TRANSFER: dict[str, Conditions] = {
 HOME = "field"
 DISSECTED_EPISODES = 16
 # Kept of each episode.
-KEPT = ("max_error_x", "max_error_y", "thrust_variation", "thrust_effort")
+KEPT = (
+    "max_error_x",
+    "max_error_y",
+    "settled_error_x",
+    "settled_error_y",
+    "thrust_variation",
+    "thrust_effort",
+)
 
 Array = NDArray[np.float64]
 Document = dict[str, Any]
@@ -174,11 +181,6 @@ def train_one(run: Run) -> None:
     train(run.plan, run.folder, lambda steps, line: None)
 
 
-def scenarios(mode: Mode, conditions: Conditions, episodes: int) -> list[Scenario]:
-    """Unseen scenarios, as `usm evaluate --seed 7` samples them."""
-    return [sample(mode, conditions, stream(TEST_SEED, EVALUATION, i)) for i in range(episodes)]
-
-
 def tasks(
     chosen: Sequence[Run], rivals: Sequence[str], episodes: int = TEST_EPISODES
 ) -> dict[tuple[str, str], Task]:
@@ -186,7 +188,9 @@ def tasks(
     robot = Robot()
     modes = {run.plan.mode for run in chosen}
     sets = {
-        (mode, name): scenarios(mode, conditions, episodes if name == HOME else episodes // 2)
+        (mode, name): unseen(
+            mode, conditions, TEST_SEED, episodes if name == HOME else episodes // 2
+        )
         for mode in sorted(modes)
         for name, conditions in {HOME: FIELD, **TRANSFER}.items()
     }
@@ -257,6 +261,8 @@ def document(
     return {
         "kind": "study",
         "study": "residual",
+        "home": HOME,
+        "seed": TEST_SEED,
         "rows": rows,
         "rivals": {
             name: {
@@ -270,14 +276,17 @@ def document(
 
 
 def row(parts: Sequence[Evaluation]) -> dict[str, Any]:
-    """Scores over seeds: mean and interquartile mean with intervals, and the seeds' means.
+    """Scores over seeds, as `Evaluation.summary` has them, with middle half and the seeds' means.
 
-    Seeds are strata of the bootstrap, whose episodes are resampled.
+    Seeds are strata of the bootstrap, whose episodes are resampled; episodes are in the order of
+    the seeds.
     """
-    found: dict[str, Any] = {"failures": int(sum(part.failed.sum() for part in parts))}
+    scores = joined(parts)
     labels = [str(seed) for seed, part in enumerate(parts) for _ in part.failed]
+    found: dict[str, Any] = {"failures": int(scores.failed.sum()), "per_episode": {}}
     for name in KEPT:
-        values = np.concatenate([part.per_episode[name] for part in parts])
+        values = scores.per_episode[name]
+        found["per_episode"][name] = values.tolist()
         found[name] = {
             "mean": float(values.mean()),
             "ci95": list(interval(np.mean, values, labels)),
@@ -285,7 +294,6 @@ def row(parts: Sequence[Evaluation]) -> dict[str, Any]:
             "iqm_ci95": list(interval(interquartile_mean, values, labels)),
             "worst": float(values.max()),
             "seeds": [float(part.per_episode[name].mean()) for part in parts],
-            "per_episode": [part.per_episode[name].tolist() for part in parts],
         }
     return found
 
@@ -306,10 +314,11 @@ def claims(found: Document) -> dict[str, Any]:
                 continue
             ours, theirs = each["scores"][HOME], other["scores"][HOME]
             axes = ("max_error_x", "max_error_y")
-            better = np.all(
-                [np.less(ours[a]["per_episode"][0], theirs[a]["per_episode"][0]) for a in axes],
-                axis=0,
-            )
+            pairs = [
+                list(zip(ours["per_episode"][a], theirs["per_episode"][a], strict=False))
+                for a in axes
+            ]
+            better = np.all([[one < two for one, two in each] for each in pairs], axis=0)
             answer[name][rival] = {
                 "ratio": [ours[a]["mean"] / theirs[a]["mean"] for a in axes],
                 "better_in_both": float(np.mean(better)),
@@ -322,7 +331,7 @@ def dissected(chosen: Sequence[Run]) -> dict[str, Any]:
     found = {}
     for run in chosen:
         if run.name in AGENTS and run.plan.seed == 0:
-            episodes = scenarios(run.plan.mode, FIELD, DISSECTED_EPISODES)
+            episodes = unseen(run.plan.mode, FIELD, TEST_SEED, DISSECTED_EPISODES)
             nominal = shared_nominal(Robot(), episodes)
             policy = make_agent(nominal, str(run.folder))
             found[run.name] = dissect(policy, nominal, episodes)

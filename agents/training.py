@@ -40,6 +40,7 @@ from agents.artifact import write_agent
 from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy
 from agents.residual_env import ResidualVectorEnv
 from agents.sb3_vec_env import SB3VecEnv
+from agents.selection import unseen
 from baselines.scoring import shared_nominal
 from usm_gym.conditions import FIELD, Conditions
 from usm_gym.evaluation import evaluate
@@ -47,7 +48,7 @@ from usm_gym.files import write_json
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
 from usm_gym.scenario import Mode, Scenario, sample
-from usm_gym.seeding import EVALUATION, TRAINING, VALIDATION, stream
+from usm_gym.seeding import TRAINING, VALIDATION, stream
 from usm_gym.validation import CONFIG, Count, Positive, in_one_line, require
 
 PLAN, CURVE, STATE, MODEL, REPLAY = "plan.json", "curve.json", "state", "model.zip", "replay"
@@ -319,9 +320,7 @@ class Keeper(BaseCallback):
     def _test(self) -> None:
         """Score the best agent on scenarios that chose nothing."""
         plan, (_, network) = self._plan, self._best
-        scenarios = [
-            sample(plan.mode, FIELD, stream(TEST_SEED, EVALUATION, i)) for i in range(TEST_EPISODES)
-        ]
+        scenarios = unseen(plan.mode, FIELD, TEST_SEED, TEST_EPISODES)
         summary = evaluate(ResidualPolicy(self._envs.residual, network), scenarios).summary()
         del summary["per_episode"]
         chosen = f"--mode {plan.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"

@@ -72,9 +72,9 @@ def run(arguments: argparse.Namespace) -> None:
         line = bar.add_task("episodes", total=sum(len(task.scenarios) for task in tasks.values()))
         cache = folder / "cache"
         scores = study.score(tasks, workers, cache, lambda episodes: bar.advance(line, episodes))
-        line = bar.add_task("dissection", total=None)
         found = {
             **study.document(runs, scores, study.RIVALS),
+            "episodes": arguments.episodes,
             "dissected": study.dissected(runs),
             "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
         }

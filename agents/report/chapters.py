@@ -22,12 +22,13 @@ from agents.report.tables import (
     score_table,
 )
 from agents.report.words import PAPERS, in_words, motion, total, verdict
-from agents.selection import named
+from agents.selection import named, unseen
 from agents.terminal import figures
 from baselines.contender import Contender
 from baselines.leaderboard import MAIN, suites
 from baselines.registry import entry, ids
 from baselines.reproduction import cases, run_case, side_by_side
+from usm_gym.conditions import FIELD
 from usm_gym.scenario import Scenario
 from usm_gym.validation import in_one_line, require
 
@@ -220,11 +221,54 @@ def reproduction(result: Document, choice: Choice, progress: Progress) -> Chapte
     )
 
 
+def study(result: Document, choice: Choice, progress: Progress) -> Chapter:
+    """Trained agents beside the classical policies."""
+    kinds = {"agents": True, "ablations": False}
+    trained = {
+        title: {name: row for name, row in result["rows"].items() if row["agent"] is agent}
+        for title, agent in kinds.items()
+    }
+    everyone = {**trained["agents"], **result["rivals"], **trained["ablations"]}
+    scores = {
+        (row["mode"], kind, name): {**each, "competitor": True}
+        for name, row in everyone.items()
+        for kind, each in row["scores"].items()
+    }
+    tables = {
+        f"{mode}, {kind}": score_table(
+            {name: row for (m, k, name), row in scores.items() if (m, k) == (mode, kind)}, {}
+        )
+        for mode, kind in dict.fromkeys((mode, kind) for mode, kind, _ in scores)
+    }
+    home = {
+        name: row
+        for (mode, kind, name), row in scores.items()
+        if (mode, kind) == ("operation", result["home"]) and name not in trained["ablations"]
+    }
+    home = dict(sorted(home.items(), key=lambda pair: total(pair[1])))
+    episodes = unseen("operation", FIELD, result["seed"], result["episodes"])
+    return Chapter(
+        title="Study of residual agents",
+        lead=f"{len(trained['agents'])} agents under several seeds, and what they owe to what.",
+        motion=motion(home),
+        verdict=verdict(home, len(episodes)),
+        blocks=[
+            replay(episodes, home, choice, progress),
+            Tables("Scores", f"{SCORES} All seeds together.", "where", tables),
+            *(plots.learning(rows) for rows in trained.values() if rows),
+            plots.front(home, {}),
+            names(),
+            provenance(result["provenance"]),
+        ],
+    )
+
+
 KINDS: dict[str, Callable[[Document, Choice, Progress], Chapter]] = {
     "evaluation": evaluation,
     "leaderboard": leaderboard,
     "robustness": robustness,
     "reproduction": reproduction,
+    "study": study,
 }
 
 

@@ -66,6 +66,38 @@ def beaten(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> boo
 
 def robustness(curves: Mapping[str, Sequence[Row]], label: str) -> Plot:
     """Error against a quantity, with intervals."""
+    return error_curves(
+        "Error curves",
+        "Largest position error after settling, mean over the episodes; shaded is its 95 % "
+        "interval.",
+        curves,
+        label,
+    )
+
+
+def learning(rows: Mapping[str, Row]) -> Plot:
+    """Error against the steps of a training, from the best seed to the worst."""
+    curves: dict[str, list[Row]] = {}
+    for name, row in rows.items():
+        curves[name] = []
+        for points in zip(*row["curves"].values(), strict=False):
+            point: dict[str, Any] = {"value": points[0]["steps"] / 1e6}
+            for axis in ("max_error_x", "max_error_y"):
+                errors = [each[axis] for each in points]
+                mean = sum(errors) / len(errors)
+                point[axis] = {"mean": mean, "ci95": (min(errors), max(errors))}
+            curves[name].append(point)
+    return error_curves(
+        "Learning curves",
+        "Largest position error after settling on held-out scenarios; mean over the seeds, shaded "
+        "from the best to the worst.",
+        curves,
+        "million steps",
+    )
+
+
+def error_curves(title: str, text: str, curves: Mapping[str, Sequence[Row]], label: str) -> Plot:
+    """Errors in x and y against something."""
     panels = []
     for axis in "xy":
         series = []
@@ -83,9 +115,8 @@ def robustness(curves: Mapping[str, Sequence[Row]], label: str) -> Plot:
             series.append({"name": name, "x": values, "y": mean, "low": low, "high": high})
         panels.append({"label": f"error in {axis}, mm", "series": series})
     return Plot(
-        "Error curves",
-        "Largest position error after settling, mean over the episodes; shaded is its 95 % "
-        "interval.",
+        title,
+        text,
         {
             "kind": "curves",
             "x": {"label": label, "log": False},

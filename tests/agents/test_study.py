@@ -44,7 +44,13 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     chosen = ["--policies", agent, "--seed", "7", "--episodes", "4"]
     main(["evaluate", *chosen, "--output", str(out)])
     again = json.loads(out.read_text())["results"][agent]["per_episode"]["max_error_x"]
-    assert scores["field"]["max_error_x"]["per_episode"] == [again]
+    assert scores["field"]["per_episode"]["max_error_x"] == again
+
+    page = tmp_path / "page.html"
+    main(["report", str(folder / "study.json"), "--policies", "sta,zero", "--output", str(page)])
+    text = page.read_text()
+    assert "Learning curves" in text
+    assert "residual-ppo" in text
 
     # What is done is not done again; another training in its place is refused.
     monkeypatch.setattr(study, "train_one", None)
