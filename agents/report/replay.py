@@ -21,7 +21,7 @@ from usm_gym.scenario import Scenario
 Array = NDArray[np.float64]
 
 # Pictures of the robot per second; errors and thrust are kept as often as they are measured.
-FPS = 12.5
+FPS = 10.0
 # Of a record at the paper's step, one error and effort every so often, s.
 RECORD_PERIOD = 0.01
 INT16 = 32767
