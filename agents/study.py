@@ -47,6 +47,7 @@ AGENTS: dict[str, Plan] = {
     "residual-sta-tuned": Plan(base="sta-tuned", steps=1_000_000),
     "residual-pd": Plan(base="pd", steps=1_500_000),
     "residual-lqg": Plan(base="lqg-tuned", steps=1_500_000),
+    "residual-lqg-joints": Plan(base="lqg-joints-tuned", steps=1_500_000),
     "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_000_000),
     "rl-only": Plan(base="zero", steps=2_000_000),
     "residual-sac": Plan(algorithm="sac", steps=250_000),
