@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -17,11 +18,15 @@ from usm_gym.evaluation import Trajectory, rollout
 from usm_gym.files import replacing
 from usm_gym.nominal import nominal_of
 from usm_gym.picture import Picture, Recorder
-from usm_gym.rendering import Canvas, Frame, Window, error_scale
+from usm_gym.rendering import Canvas, Frame, error_scale
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.simulation import Simulation
 from usm_gym.validation import in_one_line
+from usm_gym.window import Window
+
+# It warns of films that Ctrl-C has ended before their first frame; they are removed anyway.
+logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
 
 # Frames per second of each medium, and how wide a policy's frame is: alone, and beside another.
 # A GIF's times are multiples of 0.01 s, and it grows fast.
