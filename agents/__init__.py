@@ -12,8 +12,8 @@ from usm_gym.scenario import MODES
 for _mode in MODES:
     gym.register(
         id=f"USM-{_mode.capitalize()}Residual-v0",
-        entry_point="agents.residual:make_residual_env",
-        vector_entry_point="agents.residual:make_residual_vector_env",
+        entry_point="agents.residual_env:make_residual_env",
+        vector_entry_point="agents.residual_env:make_residual_vector_env",
         kwargs={"mode": _mode},
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +19,39 @@ from agents.network import Activation, Network
 
 # Rewards are multiplied by this in training, so that returns are of order one.
 REWARD_SCALE = 0.1
+CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 # Robots side by side: for PPO a rollout is many robots by few steps, so that little time is spent
 # between steps; the others learn after each step of all.
 ROBOTS = {"ppo": 256, "sac": 32, "td3": 32, "tqc": 32}
+
+_OFF_POLICY: dict[str, Any] = {
+    "hidden": (64, 64),
+    "learning_rate": 5e-4,
+    "buffer_size": 300_000,
+    "learning_starts": 10_000,
+    "batch_size": 256,
+    "gamma": 0.97,
+    "train_freq": 1,
+    "gradient_steps": 2,
+}
+# Widths of the hidden layers, and arguments that are not defaults. The rate of PPO falls
+# linearly to a tenth over the training; TD3 explores with independent noise of that deviation.
+SETTINGS: dict[str, dict[str, Any]] = {
+    "ppo": {
+        "hidden": (128, 128),
+        "n_steps": 64,
+        "batch_size": 1024,
+        "n_epochs": 6,
+        "learning_rate": 5e-4,
+        "gamma": 0.97,
+        "gae_lambda": 0.95,
+        "target_kl": 0.03,
+        "log_std_init": -1.5,  # small exploration around the base
+    },
+    "sac": _OFF_POLICY | {"ent_coef": "auto_0.01"},
+    "td3": _OFF_POLICY | {"noise": 0.2},
+    "tqc": _OFF_POLICY | {"ent_coef": "auto_0.01"},
+}
 
 
 @dataclass(frozen=True)
@@ -36,100 +65,45 @@ class Falling:
         return self.start * (0.1 + 0.9 * remaining)
 
 
-def ppo(env: VecEnv) -> BaseAlgorithm:
-    """PPO: small exploration around the base, which a new network leaves as it is."""
-    model = PPO(
-        "MlpPolicy",
-        env,
-        n_steps=64,
-        batch_size=1024,
-        n_epochs=6,
-        learning_rate=Falling(5e-4),
-        gamma=0.97,
-        gae_lambda=0.95,
-        target_kl=0.03,
-        policy_kwargs={"net_arch": [128, 128], "activation_fn": nn.Tanh, "log_std_init": -1.5},
-        device="cpu",
-    )
-    _near_zero(model.policy.action_net)
+def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
+    """A new model, whose deterministic actions are nearly zero, so that the base acts as it is."""
+    arguments: dict[str, Any] = dict(SETTINGS[algorithm])
+    policy: dict[str, Any] = {"net_arch": list(arguments.pop("hidden"))}
+    if algorithm == "ppo":
+        policy["activation_fn"] = nn.Tanh
+        policy["log_std_init"] = arguments.pop("log_std_init")
+        arguments["learning_rate"] = Falling(arguments["learning_rate"])
+    if algorithm == "td3":
+        assert isinstance(env.action_space, Box)
+        zero = np.zeros(env.action_space.shape)
+        noise = NormalActionNoise(zero, zero + arguments.pop("noise"))
+        arguments["action_noise"] = VectorizedActionNoise(noise, env.num_envs)
+    model = CLASSES[algorithm]("MlpPolicy", env, policy_kwargs=policy, device="cpu", **arguments)
+    with torch.no_grad():
+        last = _layers(algorithm, model)[-1]
+        last.weight.mul_(0.01)
+        last.bias.zero_()
     return model
-
-
-OFF_POLICY: dict[str, Any] = {
-    "learning_rate": 5e-4,
-    "buffer_size": 300_000,
-    "learning_starts": 10_000,
-    "batch_size": 512,
-    "gamma": 0.97,
-    "train_freq": 1,
-    "gradient_steps": 4,
-    "device": "cpu",
-}
-
-
-def sac(env: VecEnv) -> BaseAlgorithm:
-    """SAC."""
-    model = SAC("MlpPolicy", env, ent_coef="auto_0.01", policy_kwargs=_hidden(), **OFF_POLICY)
-    _near_zero(model.actor.mu)
-    return model
-
-
-def tqc(env: VecEnv) -> BaseAlgorithm:
-    """TQC: SAC with truncated quantile critics."""
-    model = TQC("MlpPolicy", env, ent_coef="auto_0.01", policy_kwargs=_hidden(), **OFF_POLICY)
-    _near_zero(model.actor.mu)
-    return model
-
-
-def td3(env: VecEnv) -> BaseAlgorithm:
-    """TD3, exploring with independent noise."""
-    assert isinstance(env.action_space, Box)
-    actions = env.action_space.shape[0]
-    noise = NormalActionNoise(np.zeros(actions), np.full(actions, 0.2))
-    model = TD3(
-        "MlpPolicy",
-        env,
-        action_noise=VectorizedActionNoise(noise, env.num_envs),
-        policy_kwargs=_hidden(),
-        **OFF_POLICY,
-    )
-    _near_zero(model.actor.mu[-2])
-    return model
-
-
-ALGORITHMS: dict[str, Callable[[VecEnv], BaseAlgorithm]] = {
-    "ppo": ppo,
-    "sac": sac,
-    "td3": td3,
-    "tqc": tqc,
-}
-CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
 
 
 def network_of(algorithm: str, model: Any) -> Network:
     """The part of a model that acts, deterministically, without torch."""
-    policy = model.policy
-    if algorithm == "ppo":
-        layers = [*policy.mlp_extractor.policy_net, policy.action_net]
-    elif algorithm == "td3":
-        layers = [*policy.actor.mu]
-    else:
-        layers = [*policy.actor.latent_pi, policy.actor.mu]
-    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
-    activation: Activation = "tanh" if isinstance(layers[1], nn.Tanh) else "relu"
+    layers = _layers(algorithm, model)
+    activation: Activation = "tanh" if algorithm == "ppo" else "relu"
     return Network(
-        tuple(layer.weight.detach().numpy().T.copy() for layer in linear),
-        tuple(layer.bias.detach().numpy().copy() for layer in linear),
+        tuple(layer.weight.detach().numpy().T.copy() for layer in layers),
+        tuple(layer.bias.detach().numpy().copy() for layer in layers),
         activation,
         "clip" if algorithm == "ppo" else "tanh",
     )
 
 
-def _hidden() -> dict[str, Any]:
-    return {"net_arch": [128, 128]}  # a new one for each model, which writes into it
-
-
-def _near_zero(layer: Any) -> None:
-    with torch.no_grad():
-        layer.weight.mul_(0.01)
-        layer.bias.zero_()
+def _layers(algorithm: str, model: Any) -> list[nn.Linear]:
+    policy = model.policy
+    if algorithm == "ppo":
+        modules = [*policy.mlp_extractor.policy_net, policy.action_net]
+    elif algorithm == "td3":
+        modules = [*policy.actor.mu]
+    else:
+        modules = [*policy.actor.latent_pi, policy.actor.mu]
+    return [module for module in modules if isinstance(module, nn.Linear)]

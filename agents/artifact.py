@@ -22,12 +22,11 @@ from safetensors.numpy import load, save
 from agents.network import Activation, Network, Output
 from agents.residual import ActionKind, Residual, ResidualPolicy
 from baselines.contender import Contender, fingerprint
-from baselines.policy import Policy
 from baselines.registry import make, register
 from usm_gym.files import write_bytes, write_json
 from usm_gym.nominal import Nominal
 from usm_gym.scenario import Mode
-from usm_gym.validation import CONFIG, Number, Positive, in_one_line, require
+from usm_gym.validation import CONFIG, Count, Number, Positive, in_one_line, require
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
 PRETRAINED = Path(__file__).with_name("pretrained")
@@ -45,6 +44,8 @@ class Agent:
         gains: All gains of the base, by name.
         residual_scale: Largest residual, N and N m.
         action: What the action is.
+        omit: Entries of the observation that it is not shown.
+        frames: How many observations it sees at once.
         layout: Fingerprint of the observation's layout.
         activation: Of the hidden layers.
         output: Of the last layer.
@@ -63,6 +64,8 @@ class Agent:
     gains: dict[str, Number]
     residual_scale: Positive
     action: ActionKind
+    omit: tuple[str, ...]
+    frames: Count
     layout: str
     activation: Activation
     output: Output
@@ -121,7 +124,7 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
         raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
 
 
-def make_agent(nominal: Nominal, folder: str) -> Policy:
+def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     """Make the policy of an agent's folder.
 
     Raises:
@@ -130,7 +133,7 @@ def make_agent(nominal: Nominal, folder: str) -> Policy:
     """
     agent, network = read_agent(Path(folder))
     base = make(agent.base, nominal, **agent.gains)
-    residual = Residual(nominal, base, agent.residual_scale, agent.action)
+    residual = Residual(nominal, base, agent.residual_scale, agent.action, agent.omit, agent.frames)
     require(
         agent.layout == residual.layout.fingerprint,
         f"observation layout of {folder}",

@@ -18,11 +18,12 @@ import numpy as np
 
 from baselines.paper_rate import Law, simulate
 from baselines.registry import make
+from usm_gym.conditions import Conditions
 from usm_gym.evaluation import evaluate
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot, Thruster
-from usm_gym.scenario import Conditions, Scenario, named, sample
 from usm_gym.scenario import Path as Track
+from usm_gym.scenario import Scenario, named, sample
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.simulation import Simulation
 from usm_gym.suites import suite

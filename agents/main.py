@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -14,8 +13,10 @@ from agents.commands import (
     evaluate,
     leaderboard,
     policies,
+    report,
     reproduce,
     robustness,
+    study,
     train,
     tune,
     watch,
@@ -31,7 +32,9 @@ COMMANDS = (
     robustness,
     tune,
     train,
+    study,
     watch,
+    report,
     reproduce,
     bench,
 )
@@ -46,8 +49,10 @@ A first look, in half a minute:
   usm leaderboard              all of them on all frozen suites
   usm robustness --vary noise  how they fare when something gets worse
   usm watch                    one of them at work
+  usm report RESULT.json       a page with all of it, to be played
   usm tune POLICY              better gains for one of them
   usm train --output DIR       an agent that adds thrust to one of them
+  usm study residual           what trained agents owe to what
   usm reproduce                the paper's Table 1 and figures
   usm bench                    how fast all this is here
 """
@@ -55,11 +60,7 @@ A first look, in half a minute:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and leave with its status: 2 for bad input, 130 for Ctrl-C."""
-    parser = Parser(
-        prog="usm",
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = Parser(prog="usm", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:

@@ -14,8 +14,8 @@ from typing import Any
 
 import joblib
 
+from usm_gym.conditions import Conditions, conditions_of
 from usm_gym.files import check_writable
-from usm_gym.scenario import Conditions, conditions_of
 from usm_gym.validation import require
 
 # How long a cluster may take to accept a connection, s.

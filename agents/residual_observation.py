@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -10,16 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.estimator import Estimator
-from baselines.lqg import LQG
+from baselines.lqg import LQG, JointLQG
+from baselines.mpc import MPC
 from baselines.pd import PD
 from baselines.policy import Policy, ScriptedPolicy, Signals
+from baselines.prediction import ESTIMATES
 from baselines.super_twisting import SuperTwisting
 from usm_gym.observation import Entry, Layout, ObservationLayout
+from usm_gym.validation import require
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _RATE = Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer")
 _DISTURBANCE = Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same")
+_REST = Entry("base_disturbance", 2, "m/s^2", 0.2, 4.0, "what the base's model leaves out")
 _INTEGRAL = Entry("base_integral", 2, "m/s^2", 2.0, 40.0, "v of the super-twisting law (11)")
 _ADAPTED = Entry("base_alpha", 2, "m^(1/2)/s^(3/2)", 50.0, 500.0, "alpha of the same")
 # The numbers of a law's state that the agent sees, by their index in each axis. Of a base that is
@@ -27,7 +32,9 @@ _ADAPTED = Entry("base_alpha", 2, "m^(1/2)/s^(3/2)", 50.0, 500.0, "alpha of the 
 BASE_STATES: dict[type, dict[int, Entry]] = {
     SuperTwisting: {1: _RATE, 2: _DISTURBANCE, 4: _INTEGRAL, 5: _ADAPTED},
     PD: {1: _RATE, 2: _DISTURBANCE},
-    LQG: {1: _RATE, 2: _DISTURBANCE},
+    LQG: {1: _RATE, 2: _REST},
+    JointLQG: {1: _RATE, 2: _REST},
+    MPC: {1: _RATE, 2: _REST},
 }
 
 
@@ -39,15 +46,27 @@ class ResidualLayout(Layout):
         thrusters: Number of thrusters.
         actions: Number of numbers in an action.
         base: Entries of the base's own state.
+        omit: Names of entries that are left out.
+        frames: How many observations are shown at once, the latest last.
     """
 
     thrusters: int
     actions: int
     base: tuple[Entry, ...]
+    omit: tuple[str, ...] = ()
+    frames: int = 1
 
-    @cached_property
-    def entries(self) -> tuple[Entry, ...]:
-        """All entries in order."""
+    def __post_init__(self) -> None:
+        """Refuse names of no entry."""
+        known = [entry.name for entry in self.complete]
+        for name in self.omit:
+            require(name in known, "omit", name, ", ".join(known))
+        number = isinstance(self.frames, int) and self.frames >= 1
+        require(number, "frames", self.frames, "an integer >= 1")
+
+    @property
+    def complete(self) -> tuple[Entry, ...]:
+        """All entries that a frame can have, in order."""
         return (
             Entry("position_error", 2, "m", 0.002, 0.02, "as measured (x, y)"),
             Entry("reference_velocity", 2, "m/s", 0.1, 1.0, "velocity of the reference (x, y)"),
@@ -82,6 +101,21 @@ class ResidualLayout(Layout):
             Entry("bending_joints", 1, "1", 10.0, 100.0, "how many joints are asked to bend"),
         )
 
+    @cached_property
+    def frame(self) -> tuple[Entry, ...]:
+        """The entries of one frame, in order."""
+        return tuple(entry for entry in self.complete if entry.name not in self.omit)
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """All entries in order; those of earlier frames have their age in the name."""
+        earlier = [
+            replace(entry, name=f"{entry.name}[-{age}]")
+            for age in range(self.frames - 1, 0, -1)
+            for entry in self.frame
+        ]
+        return (*earlier, *self.frame)
+
 
 class ResidualObserver:
     """Makes the agent's observation from the plain one, for a batch.
@@ -91,12 +125,19 @@ class ResidualObserver:
     """
 
     def __init__(
-        self, base: Policy, plain: ObservationLayout, actions: int, estimator: Estimator
+        self,
+        base: Policy,
+        plain: ObservationLayout,
+        actions: int,
+        estimator: Estimator,
+        omit: tuple[str, ...],
+        frames: int,
     ) -> None:
         """Take the base, whose state is shown, and the layout of the plain observation."""
         self._base, self._plain, self._estimator = base, plain, estimator
         self._shown = BASE_STATES.get(type(base), {})
-        self.layout = ResidualLayout(plain.thrusters, actions, tuple(self._shown.values()))
+        entries = tuple(self._shown.values())
+        self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
 
     def update(
         self,
@@ -105,7 +146,7 @@ class ResidualObserver:
         base_state: Any,
         last_action: NDArray[np.float32],
         state: Array | None,
-        start: NDArray[np.bool_],
+        start: Flags,
     ) -> tuple[NDArray[np.float32], Signals, Array]:
         """Take in a batch of observations.
 
@@ -121,45 +162,59 @@ class ResidualObserver:
             The agent's observations, (batch, layout.size); what was measured; and the state for the
             next call.
         """
-        signals, estimates, innovation, state = self._estimator.update(observation, state, start)
+        earlier = self.layout.size - self.layout.size // self.layout.frames
+        past, filtered = (None, None) if state is None else np.split(state, [earlier], axis=1)
+        signals, estimates, innovation, filtered = self._estimator.update(
+            observation, filtered, start
+        )
         value = self._values(observation)
-        shown: list[Array] = []
-        if self._shown:
-            assert isinstance(self._base, ScriptedPolicy)
-            law = self._base.law_state(base_state)
-            shown = [law[:, :, index] for index in self._shown]
-        base_forces = base_action * value["thruster_limit"]
-        wrench = np.einsum("bwt,bt->bw", signals.allocation, base_forces)
         references = value["joint_references"]
         links = self._plain.links
         # Of the rates of the joints, that of joint i turns the links after it.
         behind = np.arange(links - 1, 0, -1) / links
-        parts = [
-            signals.y,
-            signals.velocity,
-            signals.acceleration,
-            *(estimates[:, :, k] for k in range(estimates.shape[2])),
-            innovation,
-            *shown,
-            wrench,
-            value["thruster_command"],
-            last_action,
-            value["tail_angle"] - _sum(behind * value["joint_angles"]),
-            value["heading_error"],
-            value["tail_rate"] - _sum(behind * value["joint_rates"]),
-            _sum(value["joint_angles"]),
-            _sum(value["joint_rates"]),
-            _sum(references),
-            _sum(value["joint_reference_rates"]),
-            _sum(value["joint_reference_accelerations"]),
-            _sum((references != 0.0).astype(np.float64)),
-        ]
-        seen = np.concatenate(parts, axis=1) / self.layout.scale
-        return (
-            np.clip(seen, -self.layout.bound, self.layout.bound).astype(np.float32),
-            signals,
-            state,
-        )
+        numbers: dict[str, Array] = {
+            "position_error": signals.y,
+            "reference_velocity": signals.velocity,
+            "reference_acceleration": signals.acceleration,
+            "estimated_error": estimates[:, :, 0],
+            "estimated_rate": estimates[:, :, 1],
+            "estimated_disturbance": estimates[:, :, 2],
+            "estimated_thrust": estimates[:, :, 3],
+            "innovation": innovation,
+            **self._base_numbers(signals, base_action * value["thruster_limit"], base_state),
+            "thruster_command": value["thruster_command"],
+            "last_action": last_action.astype(np.float64),
+            "heading": value["tail_angle"] - _sum(behind * value["joint_angles"]),
+            "heading_error": value["heading_error"],
+            "heading_rate": value["tail_rate"] - _sum(behind * value["joint_rates"]),
+            "deflection": _sum(value["joint_angles"]),
+            "deflection_rate": _sum(value["joint_rates"]),
+            "reference_deflection": _sum(references),
+            "reference_deflection_rate": _sum(value["joint_reference_rates"]),
+            "reference_deflection_acceleration": _sum(value["joint_reference_accelerations"]),
+            "bending_joints": _sum((references != 0.0).astype(np.float64)),
+        }
+        frame = np.concatenate([numbers[entry.name] for entry in self.layout.frame], axis=1)
+        frames = np.tile(frame, self.layout.frames)
+        if past is not None:
+            frames[~start, :earlier] = past[~start]
+        seen = np.clip(frames / self.layout.scale, -self.layout.bound, self.layout.bound)
+        kept = frames[:, frames.shape[1] - earlier :]
+        return seen.astype(np.float32), signals, np.concatenate([kept, filtered], axis=1)
+
+    def _base_numbers(
+        self, signals: Signals, forces: NDArray[np.float64], state: Any
+    ) -> dict[str, Array]:
+        wrench = np.einsum("bwt,bt->bw", signals.allocation, forces)
+        numbers = {"base_force": wrench[:, :2], "base_moment": wrench[:, 2:]}
+        if self._shown:
+            assert isinstance(self._base, ScriptedPolicy)
+            law = self._base.law_state(state)
+            if law.ndim == 2:  # a predictor's: (e, v, d) of x and of y come first
+                law = law[:, :ESTIMATES].reshape(len(law), 2, -1)
+            for index, entry in self._shown.items():
+                numbers[entry.name] = law[:, :, index]
+        return numbers
 
     def _values(self, observation: NDArray[np.float32]) -> dict[str, Array]:
         physical = observation * self._plain.scale

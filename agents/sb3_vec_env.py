@@ -13,7 +13,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
-from agents.residual import ResidualVectorEnv
+from agents.residual_env import ResidualVectorEnv
 from usm_gym.validation import require
 from usm_gym.vector_env import USMVectorEnv
 

@@ -14,10 +14,11 @@ from agents.options import add_computing, computing, count, parse_conditions
 from agents.terminal import progress_bar
 from baselines.contender import Contender, contender
 from baselines.registry import entry, ids
-from baselines.scoring import TIME_LIMIT, Refusal, Task, score_all, shared_nominal
+from baselines.scoring import BATCH, TIME_LIMIT, Refusal, Task, score_all, shared_nominal
+from usm_gym.conditions import Conditions
 from usm_gym.evaluation import Evaluation
 from usm_gym.robot import Robot
-from usm_gym.scenario import MODES, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import MODES, Mode, Scenario, sample
 from usm_gym.seeding import EVALUATION, stream
 from usm_gym.suites import NAMES, suite
 from usm_gym.validation import in_one_line, require
@@ -66,8 +67,8 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=TIME_LIMIT,
         metavar="S",
-        help="how long a controller of your own may think in a batch of up to 32 episodes, s "
-        "(default: 120)",
+        help=f"how long a controller of your own may think in a batch of up to {BATCH} episodes, "
+        f"s (default: {TIME_LIMIT:g})",
     )
 
 
@@ -124,10 +125,12 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
     episodes = count(arguments, "episodes", 50)
     seed = count(arguments, "seed", 0, least=0)
     mode: Mode = arguments.mode or "operation"
-    return [
-        sample(mode, conditions or Conditions(), stream(seed, EVALUATION, i))
-        for i in range(episodes)
-    ]
+    return unseen(mode, conditions or Conditions(), seed, episodes)
+
+
+def unseen(mode: Mode, conditions: Conditions, seed: int, episodes: int) -> list[Scenario]:
+    """Scenarios sampled under a seed, which no training and no tuning ever meets."""
+    return [sample(mode, conditions, stream(seed, EVALUATION, i)) for i in range(episodes)]
 
 
 def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
@@ -183,6 +186,20 @@ def scored(
         total = sum(len(task.scenarios) for task in chosen)
         line = bar.add_task("episodes", total=total)
         return score_all(chosen, workers, cache, lambda episodes: bar.advance(line, episodes))
+
+
+def by_name(
+    chosen: Sequence[Task], outcomes: Sequence[Evaluation | Refusal]
+) -> tuple[dict[str, Evaluation], dict[str, str]]:
+    """The scores of tasks by the name of the policy, and why the others have none."""
+    found: dict[str, Evaluation] = {}
+    refused: dict[str, str] = {}
+    for task, outcome in zip(chosen, outcomes, strict=True):
+        if isinstance(outcome, Refusal):
+            refused[task.contender.name] = outcome.reason
+        else:
+            found[task.contender.name] = outcome
+    return found, refused
 
 
 def leave_if_refused(refused: Mapping[str, str]) -> None:

@@ -5,14 +5,22 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from typing import NoReturn
+from collections.abc import Iterable
+from typing import Any, NoReturn
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that says what is wrong in one line."""
+    """An argument parser that keeps the lines of its texts and says what is wrong in one."""
+
+    def __init__(self, **options: Any) -> None:
+        """Take the options of `argparse.ArgumentParser`."""
+        super().__init__(**options)
+        self.formatter_class = argparse.RawDescriptionHelpFormatter
 
     def error(self, message: str) -> NoReturn:
         """Leave with status 2."""
@@ -37,6 +45,16 @@ def progress_bar() -> Progress:
         transient=True,
         disable=not console.is_terminal,
     )
+
+
+def empty_table(*words: str, numbers: Iterable[str] = (), title: str | None = None) -> Table:
+    """A table without rows: columns of words, then columns of numbers, which are aligned right."""
+    table = Table(
+        *words, title=title, title_justify="left", title_style="", box=SIMPLE_HEAD, pad_edge=False
+    )
+    for heading in numbers:
+        table.add_column(heading, justify="right")
+    return table
 
 
 def figures(value: float) -> str:

@@ -8,12 +8,13 @@ What is passed on is the agent (`agents.artifact`).
 from __future__ import annotations
 
 import dataclasses
+import json
 import pickle
 import random
+import shlex
 import shutil
 import time
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -27,28 +28,43 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
-from agents.algorithms import ALGORITHMS, CLASSES, REWARD_SCALE, ROBOTS, network_of
+from agents.algorithms import (
+    CLASSES,
+    REWARD_SCALE,
+    ROBOTS,
+    SETTINGS,
+    make_model,
+    network_of,
+)
 from agents.artifact import write_agent
-from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy, ResidualVectorEnv
+from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy
+from agents.residual_env import ResidualVectorEnv
 from agents.sb3_vec_env import SB3VecEnv
+from agents.selection import unseen
 from baselines.scoring import shared_nominal
+from usm_gym.conditions import FIELD, Conditions
 from usm_gym.evaluation import evaluate
 from usm_gym.files import write_json
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
-from usm_gym.scenario import FIELD, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.seeding import TRAINING, VALIDATION, stream
 from usm_gym.validation import CONFIG, Count, Positive, in_one_line, require
 
 PLAN, CURVE, STATE, MODEL, REPLAY = "plan.json", "curve.json", "state", "model.zip", "replay"
 # Held-out scenarios of the training distribution, the same for all trainings.
 VALIDATION_EPISODES = 32
+# The scenarios on which the agent is scored in the end, as `usm evaluate` samples them.
+TEST_SEED, TEST_EPISODES = 7, 100
 # A training has diverged when so many validations in a row are so many times worse than the best.
 COLLAPSE_COUNT, COLLAPSE_RATIO = 3, 5.0
 # And when a weight is larger than this.
 LARGEST_WEIGHT = 1e6
 
 VALIDATED = ("max_error_x", "max_error_y", "thrust_variation")
+
+# Fields of a plan, and of an agent's description, that are arguments of the residual task.
+TASK = ("residual_scale", "action", "omit", "frames")
 
 Report = Callable[[int, str], None]
 
@@ -67,6 +83,8 @@ class Plan:
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, N and N m.
         action: What the action is: "wrench" or "thrusters".
+        omit: Entries of the observation that the agent is not shown.
+        frames: How many observations it sees at once.
         conditions: Conditions from which scenarios are sampled.
         seed: Seed of everything random.
         steps: Control periods to train on, over all robots.
@@ -78,6 +96,8 @@ class Plan:
     base: str = "sta"
     residual_scale: Positive = RESIDUAL_SCALE
     action: ActionKind = "wrench"
+    omit: tuple[str, ...] = ()
+    frames: Count = 1
     conditions: Conditions = FIELD
     seed: int = 0
     steps: Count = 3_000_000
@@ -85,7 +105,7 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained."""
-        require(self.algorithm in ALGORITHMS, "algorithm", self.algorithm, ", ".join(ALGORITHMS))
+        require(self.algorithm in CLASSES, "algorithm", self.algorithm, ", ".join(CLASSES))
         require(self.seed >= 0, "seed", self.seed, "0 or more")
         known = [id for id in gym.registry if id.endswith("Residual-v0")]
         require(self.env.removeprefix("agents:") in known, "env", self.env, ", ".join(known))
@@ -96,6 +116,27 @@ class Plan:
         """The mode of the task."""
         mode: Mode = gym.registry[self.env.removeprefix("agents:")].kwargs["mode"]
         return mode
+
+    @property
+    def task(self) -> dict[str, Any]:
+        """What the residual task is, but for its base."""
+        return {name: getattr(self, name) for name in TASK}
+
+    def command(self, output: str) -> str:
+        """The command that does it."""
+        words = ["usm", "train"]
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if value == field.default:
+                continue
+            if isinstance(value, tuple):
+                value = ",".join(value)
+            if isinstance(value, Conditions):
+                changed = _PLAN.dump_python(self, mode="json")["conditions"].items()
+                usual = dataclasses.asdict(FIELD)
+                value = json.dumps({k: v for k, v in changed if v != _listed(usual[k])})
+            words += [f"--{field.name.replace('_', '-')}", str(value)]
+        return shlex.join([*words, "--output", output])
 
     def scenario(self, random: np.random.Generator) -> Scenario:
         """Draw a scenario of the training distribution."""
@@ -140,18 +181,16 @@ def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
         num_envs=ROBOTS[plan.algorithm],
         vectorization_mode="vector_entry_point",
         autoreset_mode="SameStep",
-        base=plan.base,
-        residual_scale=plan.residual_scale,
-        action=plan.action,
         conditions=plan.conditions,
+        base=plan.base,
+        **plan.task,
     )
     assert isinstance(envs, ResidualVectorEnv)
     face = SB3VecEnv(envs, REWARD_SCALE)
     keeper = Keeper(plan, folder, envs, face, report)
     checkpoint = latest_checkpoint(folder)
     model = begin(plan, face) if checkpoint is None else keeper.resume(checkpoint)
-    formats = ["tensorboard"] if find_spec("tensorboard") else []
-    model.set_logger(configure(str(folder), formats))
+    model.set_logger(configure(str(folder), ["tensorboard"]))
     remaining = plan.steps - model.num_timesteps
     if remaining > 0:
         try:
@@ -166,7 +205,7 @@ def begin(plan: Plan, face: SB3VecEnv) -> BaseAlgorithm:
     """Make the model and choose the first episodes."""
     set_random_seed(plan.seed)
     face.action_space.seed(plan.seed)
-    model = ALGORITHMS[plan.algorithm](face)
+    model = make_model(plan.algorithm, face)
     random = stream(plan.seed, TRAINING)
     face.seed(int(random.integers(2**31)))
     # First episodes of all lengths, so that afterwards the robots are at all times of an episode.
@@ -208,6 +247,7 @@ class Keeper(BaseCallback):
         self._line = ""
         self._began, self._seconds = time.monotonic(), 0.0
         self._best: Any = None
+        self._scores: dict[str, Any] = {}
         self.curve: list[dict[str, Any]] = []
 
     def _on_rollout_start(self) -> None:
@@ -224,6 +264,7 @@ class Keeper(BaseCallback):
     def _on_training_end(self) -> None:
         self.check_weights(self.model)
         self._validate()
+        self._test()
         self._write_checkpoint()
 
     def check_weights(self, model: BaseAlgorithm) -> None:
@@ -265,6 +306,7 @@ class Keeper(BaseCallback):
         self.curve.append(point)
         for name, value in means.items():
             self.logger.record(f"validation/{name}", value)
+        self.logger.dump(self.num_timesteps)
         self._line = _line(point)
         self._report(self.num_timesteps, self._line)
         if self._best is None or _error(point) < _error(self._best[0]):
@@ -274,6 +316,16 @@ class Keeper(BaseCallback):
         if len(last) == COLLAPSE_COUNT and all(_error(each) > limit for each in last):
             reason = f"the error is {COLLAPSE_RATIO:g} times the best and more"
             raise self._diverged(self.num_timesteps, reason)
+
+    def _test(self) -> None:
+        """Score the best agent on scenarios that chose nothing."""
+        plan, (_, network) = self._plan, self._best
+        scenarios = unseen(plan.mode, FIELD, TEST_SEED, TEST_EPISODES)
+        summary = evaluate(ResidualPolicy(self._envs.residual, network), scenarios).summary()
+        del summary["per_episode"]
+        chosen = f"--mode {plan.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"
+        command = f"usm evaluate --policies {self._folder.name} {chosen}"
+        self._scores["sampled"] = {"command": command, **summary}
 
     def _diverged(self, steps: int, reason: str) -> DivergedError:
         kept = latest_checkpoint(self._folder)
@@ -316,18 +368,20 @@ class Keeper(BaseCallback):
             "conditions": recorded["conditions"],
             "base": plan.base.partition("@")[0],
             "gains": gains._asdict() if gains else {},
-            "residual_scale": plan.residual_scale,
-            "action": plan.action,
+            **plan.task,
             "layout": residual.layout.fingerprint,
             "algorithm": plan.algorithm,
             "seed": plan.seed,
             "steps": point["steps"],
             "training": {
                 "plan": recorded,
+                "settings": SETTINGS[plan.algorithm]
+                | {"robots": ROBOTS[plan.algorithm], "reward_scale": REWARD_SCALE},
                 "curve": self.curve,
+                "command": plan.command(self._folder.name),
                 "provenance": provenance({"seed": plan.seed}),
             },
-            "scores": {"validation": point},
+            "scores": {"validation": point, **self._scores},
         }
         write_agent(self._folder, description, network)
 
@@ -341,6 +395,10 @@ def latest_checkpoint(folder: Path) -> Path | None:
     """The last complete checkpoint, if there is one."""
     found = checkpoints(folder)
     return found[-1] if found else None
+
+
+def _listed(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _error(point: dict[str, Any]) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines import kalman
-from baselines.policy import Array, Signals, model_of, sense
+from baselines.policy import Array, Signals, model_of, signals_of
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled
 
@@ -55,13 +55,11 @@ class Estimator:
         new = np.zeros((size, filtered + 2 * kalman.STATES))
         if state is not None:
             new[~start] = state[~start]
-        y, u, velocity, acceleration, innovation = np.empty((5, size, 2))
-        allocation = np.empty((size, 3, thrusters))
-        signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
-        sense(new, self._model, signals)
+        signals = signals_of(observation, new, self._model)
+        innovation = np.empty((size, 2))
         estimates = new[:, filtered:].reshape(size, 2, kalman.STATES).copy()
         estimate_all(signals, self._model.mass, self._linear, estimates, innovation)
         new[:, 0] = 1.0
-        new[:, 1:filtered] = allocation[:, :2].reshape(size, -1)
+        new[:, 1:filtered] = signals.allocation[:, :2].reshape(size, -1)
         new[:, filtered:] = estimates.reshape(size, -1)
         return signals, estimates, innovation, new

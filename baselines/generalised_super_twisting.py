@@ -22,13 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.observer import (
-    HOMOGENEOUS,
-    check_observer,
-    compensating_force,
-    observe,
-    observer_gains,
-)
+from baselines.observer import HOMOGENEOUS, compensating_force, observe, observer_gains
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
 from baselines.super_twisting import adapt
@@ -158,11 +152,11 @@ class AdaptiveGeneralisedSuperTwisting(ScriptedPolicy):
     """
 
     law_size = 6
+    positive = ("observer_gain",)
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Take gains other than the defaults by name, see `AdaptiveGains`."""
         super().__init__(nominal, AdaptiveGains(**gains))
-        check_observer(self.gains.observer_gain, HOMOGENEOUS)
         self._law = self.gains
 
     def force(self, signals: Signals, law_state: Array) -> Array:
@@ -180,7 +174,6 @@ class GeneralisedSuperTwisting(AdaptiveGeneralisedSuperTwisting):
         """Take gains other than the defaults by name, see `GeneralisedGains`."""
         ScriptedPolicy.__init__(self, nominal, GeneralisedGains(**gains))
         own = self.gains
-        check_observer(own.observer_gain, HOMOGENEOUS)
         self._law = AdaptiveGains(
             observer_gain=own.observer_gain,
             surface=own.surface,

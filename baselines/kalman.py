@@ -7,9 +7,10 @@ inertia, and a known acceleration w:
 
     e' = v,   v' = -(drag / inertia) v + d + f + w,   d' = 0,   f' = (u - f) / lag.
 
-Sampled exactly with u and w held (Astrom, Wittenmark, Computer-Controlled Systems, 1997, section
-3.2). The filter is the stationary one (Anderson, Moore, Optimal Filtering, 1979, chapter 4): white
-noise drives v and d, the measurement of e has the nominal noise; f is computed, not corrected.
+Sampled exactly with u and w held (K. J. Astrom, B. Wittenmark, Computer-Controlled Systems, 3rd
+edition, 1997). The filter is the stationary one (B. D. O. Anderson, J. B. Moore, Optimal Filtering,
+1979, chapter 4): white noise drives v and d, the measurement of e has the nominal noise; f is
+computed, not corrected.
 """
 
 from __future__ import annotations

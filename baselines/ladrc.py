@@ -18,7 +18,6 @@ from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.elementary import exp_of_negative
-from usm_gym.validation import require
 
 LADRC_SPACE: Space = {
     "observer_bandwidth": Range(2.0, 200.0, "rad/s"),
@@ -101,12 +100,11 @@ class LADRC(ScriptedPolicy):
     """
 
     law_size = 3
+    positive = ("observer_bandwidth", "inertia")
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Take gains other than the defaults by name, see `LADRCGains`."""
         super().__init__(nominal, LADRCGains(**gains))
-        for name in ("observer_bandwidth", "inertia"):
-            require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """Observe, cancel, and place the poles of what is left."""

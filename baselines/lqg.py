@@ -6,8 +6,7 @@ where thrust and command are -(d + w): state (e, v, f + d + w, last u + d + w), 
 u. The price is on the change, not on the force, because chattering is what costs; and the last
 command is the one that was applied, so that saturation winds nothing up.
 
-Source: B. D. O. Anderson, J. B. Moore, Optimal Control: Linear Quadratic Methods, 1990, chapters 2
-and 8; section 4.3 there for the price on the input's change.
+Source: B. D. O. Anderson, J. B. Moore, Optimal Control: Linear Quadratic Methods, 1990.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from baselines.prediction import ESTIMATES, Predictor, held_force
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
-from usm_gym.validation import require
 
 LQG_SPACE: Space = {
     "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),
@@ -158,13 +156,13 @@ class LQG(ScriptedPolicy):
     """
 
     law_size = STATES
+    positive: tuple[str, ...] = ("variation_weight",)
     _Gains: type[Any] = LQGGains
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute filter and regulator; gains other than the defaults by name, see `LQGGains`."""
         super().__init__(nominal, self._Gains(**gains))
         own = self.gains
-        require(own.variation_weight > 0, "variation_weight", own.variation_weight, "a number > 0")
         self._linear = kalman.linear_model(nominal, own.acceleration_noise, own.disturbance_noise)
         weights = own.variation_weight * self._linear.inertia
         self._gain = np.stack(list(map(regulator_gain, self._linear.transition, weights)))
@@ -182,12 +180,12 @@ class JointLQG(LQG):
     Filter and future are those of `prediction.Predictor`, whose state is the law's.
     """
 
+    positive = ("variation_weight", "lead")
     _Gains = JointLQGGains
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute the gains; gains other than the defaults by name, see `JointLQGGains`."""
         super().__init__(nominal, **gains)
-        require(self.gains.lead > 0, "lead", self.gains.lead, "a number > 0")
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
         self._predictor = Predictor(nominal, self._model, self._linear.correction)
 

@@ -6,9 +6,10 @@ straight body (`kalman`). The changes over the horizon minimise the sum of e^2 +
 the force)^2, an unconstrained least-squares problem, whose first change is applied. The thrusters
 saturate it; the next period starts from what they did.
 
-Sources: E. F. Camacho, C. Bordons, Model Predictive Control, 2nd edition, 2007, chapter 2 (free and
-forced response); R. De Keyser, A. Cauwenberghe, Extended prediction self-adaptive control, IFAC
-Symposium on Identification and System Parameter Estimation 1985 (free response of another model).
+Sources: E. F. Camacho, C. Bordons, Model Predictive Control, 2nd edition, 2007 (free and forced
+response); R. M. C. De Keyser, A. R. Van Cauwenberghe, Extended prediction self-adaptive control,
+IFAC Symposium on Identification and System Parameter Estimation 1985 (free response of another
+model).
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ from baselines.prediction import Predictor, held_force
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled
-from usm_gym.validation import require
 
 MPC_SPACE: Space = {
     "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),
@@ -38,10 +38,9 @@ class MPCGains(NamedTuple):
     """Gains of the predictive controller.
 
     Attributes:
-        acceleration_noise: Spectral density of the noise on the acceleration, m/s^2 / sqrt(Hz).
-        disturbance_noise: Spectral density of the noise that drives the disturbance,
-            m/s^3 / sqrt(Hz).
-        variation_weight: Error that is as bad as a change of the force by 1 N in a period, m/N.
+        acceleration_noise: As in `lqg.LQGGains`.
+        disturbance_noise: As in `lqg.LQGGains`.
+        variation_weight: As in `lqg.LQGGains`.
         horizon: How far it looks ahead, s.
         heading_gain: k_psi, N m/rad.
     """
@@ -96,11 +95,11 @@ class MPC(ScriptedPolicy):
     The law's state is that of `prediction.Predictor`.
     """
 
+    positive = ("variation_weight", "horizon")
+
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute the gains; gains other than the defaults by name, see `MPCGains`."""
         super().__init__(nominal, MPCGains(**gains))
-        for name in ("variation_weight", "horizon"):
-            require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
         linear = kalman.linear_model(
             nominal, self.gains.acceleration_noise, self.gains.disturbance_noise
         )

@@ -17,9 +17,8 @@ from usm_gym.validation import require
 PRINTED, HOMOGENEOUS = 0.5, 2 / 3
 
 
-def check_observer(L: float, k2_exponent: float) -> None:
-    """Refuse a gain of 0 and an exponent that is neither printed nor homogeneous."""
-    require(L > 0, "observer_gain", L, "a number > 0")
+def check_exponent(k2_exponent: float) -> None:
+    """Refuse an exponent that is neither printed nor homogeneous."""
     allowed = (PRINTED, HOMOGENEOUS)
     require(k2_exponent in allowed, "k2_exponent", k2_exponent, "0.5 or 2/3")
 

@@ -38,12 +38,11 @@ class Oracle(ScriptedPolicy):
     """Predictive control that is given the true state: no competitor."""
 
     privileged = True
+    positive = ("variation_weight", "horizon")
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Compute the gains; gains other than the defaults by name, see `OracleGains`."""
         super().__init__(nominal, OracleGains(**gains))
-        for name in ("variation_weight", "horizon"):
-            require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
         self._inertia, drag = kalman.straight_body(nominal.robot)
         h, lag = nominal.control_period, nominal.thruster_time_constant
         self._periods = max(1, round(self.gains.horizon / h))

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from baselines.observer import check_observer, compensating_force, observe, observer_gains
+from baselines.observer import check_exponent, compensating_force, observe, observer_gains
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
@@ -112,11 +112,12 @@ class PD(ScriptedPolicy):
     """
 
     law_size = 4
+    positive = ("observer_gain",)
 
     def __init__(self, nominal: Nominal, reading: Reading = "force", **gains: float) -> None:
         """Take gains other than the paper's by name, see `PDGains`."""
         super().__init__(nominal, PDGains(**gains))
-        check_observer(self.gains.observer_gain, self.gains.k2_exponent)
+        check_exponent(self.gains.k2_exponent)
         require(reading in READINGS, "reading", reading, ", ".join(READINGS))
         self._reading = READINGS.index(reading)
 

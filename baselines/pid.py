@@ -1,8 +1,8 @@
 """PID with a filtered derivative and anti-windup by back-calculation.
 
 Source: K. J. Astrom, T. Hagglund, PID Controllers: Theory, Design, and Tuning, 2nd edition, 1995,
-sections 3.4 to 3.6: derivative by backward differences behind a first-order filter, integral that
-tracks the force which was really applied, with the time constant sqrt(T_i T_d).
+chapter 3: derivative by backward differences behind a first-order filter, integral that tracks the
+force which was really applied, with the time constant sqrt(T_i T_d).
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
-from usm_gym.validation import require
 
 PID_SPACE: Space = {
     "k_p": Range(30.0, 30000.0, "N/m"),
@@ -95,11 +94,11 @@ class PID(ScriptedPolicy):
     """F = -(k_p e + k_i integral of e + k_d e'), e the measured position error."""
 
     law_size = 4
+    positive = ("k_d",)
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Take gains other than the defaults by name, see `PIDGains`."""
         super().__init__(nominal, PIDGains(**gains))
-        require(self.gains.k_d > 0, "k_d", self.gains.k_d, "a number > 0")
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """The law."""

@@ -169,8 +169,18 @@ def act(observation, state, model, allocation, force, heading_gain, action):
             state[b, 1 + thrusters + j] = T[1, j]
 
 
+def signals_of(observation: NDArray[np.float32], state: Array, model: Model) -> Signals:
+    """The signals of a batch, from its observations and the shared part of its state."""
+    size = len(observation)
+    y, u, velocity, acceleration = np.empty((4, size, 2))
+    allocation = np.empty((size, 3, model.thruster_links.size))
+    signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
+    sense(state, model, signals)
+    return signals
+
+
 class ScriptedPolicy:
-    """A control law behind `predict`; subclasses give `law_size` and `force`.
+    """A control law behind `predict`; subclasses give `law_size`, `positive` and `force`.
 
     Actions are not clipped: the environment saturates them, and what it has applied comes back in
     the next observation.
@@ -184,16 +194,19 @@ class ScriptedPolicy:
     privileged = False
     # Numbers of state that the law keeps for each axis.
     law_size = 0
+    # Gains that must not be 0.
+    positive: tuple[str, ...] = ()
 
     def __init__(self, nominal: Nominal, gains: Any) -> None:
         """Keep nominal knowledge and gains.
 
         Raises:
-            ValueError: If a gain is negative or not finite.
+            ValueError: If a gain is negative or not finite, or 0 though it is among `positive`.
         """
         for name, gain in gains._asdict().items():
             number = isinstance(gain, (int, float)) and np.isfinite(gain) and gain >= 0
             require(number, name, gain, "a finite number >= 0")
+            require(gain > 0 or name not in self.positive, name, gain, "a number > 0")
         self.nominal = nominal
         self.gains = type(gains)(*map(float, gains))
         self._model = model_of(nominal)
@@ -259,10 +272,7 @@ class ScriptedPolicy:
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         size, thrusters = len(observation), self._thrusters
-        y, u, velocity, acceleration = np.empty((4, size, 2))
-        allocation = np.empty((size, 3, thrusters))
-        signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
-        sense(state, self._model, signals)
+        signals = signals_of(observation, state, self._model)
         law_state = self.law_state(state)
         force = self.force(signals, law_state)
         state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)

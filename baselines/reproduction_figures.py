@@ -12,8 +12,9 @@ from baselines.convergence import Start, cascade, disturbance_rate, growth
 from baselines.paper_rate import Array, Law, Record, simulate
 from baselines.reproduction import IMPLICIT_STEP, SAMPLE_TIME, at_step
 from baselines.super_twisting import SuperTwistingGains
+from usm_gym.conditions import PRESETS
 from usm_gym.robot import Robot
-from usm_gym.scenario import PRESETS, named
+from usm_gym.scenario import named
 
 AXES = ("x", "y")
 Records = dict[tuple[str, Any], Record]

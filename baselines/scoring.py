@@ -31,9 +31,9 @@ from usm_gym.scenario import Scenario
 from usm_gym.validation import in_one_line, require
 
 # Episodes that a policy meets side by side; a multiple of the plant's lanes.
-BATCH = 32
+BATCH = 64
 # How long the code of others may think in a batch, s.
-TIME_LIMIT = 120.0
+TIME_LIMIT = 240.0
 
 
 @dataclass(frozen=True)

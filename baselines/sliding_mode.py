@@ -5,8 +5,7 @@
 
 The integral starts where s = 0. The rate e' is that of the paper's observer, (15)-(16).
 
-Source: J.-J. E. Slotine, W. Li, Applied Nonlinear Control, 1991, section 7.1 (integral control)
-and section 7.2 (boundary layer).
+Source: J.-J. E. Slotine, W. Li, Applied Nonlinear Control, 1991, chapter 7.
 """
 
 from __future__ import annotations
@@ -15,12 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.observer import HOMOGENEOUS, check_observer, observe, observer_gains
+from baselines.observer import HOMOGENEOUS, observe, observer_gains
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
-from usm_gym.validation import require
 
 SLIDING_MODE_SPACE: Space = {
     "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
@@ -85,13 +83,11 @@ class SlidingMode(ScriptedPolicy):
     """
 
     law_size = 5
+    positive = ("observer_gain", "surface", "boundary")
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
         """Take gains other than the defaults by name, see `SlidingModeGains`."""
         super().__init__(nominal, SlidingModeGains(**gains))
-        check_observer(self.gains.observer_gain, HOMOGENEOUS)
-        for name in ("surface", "boundary"):
-            require(getattr(self.gains, name) > 0, name, getattr(self.gains, name), "a number > 0")
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """The law."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.observer import check_observer, compensating_force, observe, observer_gains
+from baselines.observer import check_exponent, compensating_force, observe, observer_gains
 from baselines.policy import Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
 from usm_gym.nominal import Nominal
@@ -145,11 +145,12 @@ class SuperTwisting(ScriptedPolicy):
     """The paper's controller: adaptive super-twisting on a third-order sliding-mode observer."""
 
     law_size = 6
+    positive = ("observer_gain",)
 
     def __init__(self, nominal: Nominal, implicit: bool = True, **gains: float) -> None:
         """Take gains other than the paper's by name, see `SuperTwistingGains`."""
         super().__init__(nominal, SuperTwistingGains(**gains))
-        check_observer(self.gains.observer_gain, self.gains.k2_exponent)
+        check_exponent(self.gains.k2_exponent)
         require(
             self.gains.beta_offset + self.gains.epsilon > 0,
             "beta_offset",

@@ -26,9 +26,10 @@ from baselines.registry import entry, tuned
 from baselines.scoring import Refusal, Task, score_all, score_batch, shared_nominal
 from baselines.space import Space
 from usm_gym import parallel
+from usm_gym.conditions import FIELD, Conditions
 from usm_gym.evaluation import Evaluation, joined
 from usm_gym.robot import Robot
-from usm_gym.scenario import FIELD, Conditions, Mode, Scenario, sample
+from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.seeding import TUNING, VALIDATION, stream
 from usm_gym.validation import in_one_line, require
 

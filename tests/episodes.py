@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from usm_gym.scenario import FIELD, Scenario, sample
+from usm_gym.conditions import FIELD
+from usm_gym.scenario import Scenario, sample
 from usm_gym.seeding import EVALUATION, stream
 
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 import baselines
 import usm_gym
 from usm_gym import Conditions, Robot, Scenario
+from usm_gym.conditions import PRESETS
 from usm_gym.evaluation import Evaluation
 from usm_gym.nominal import nominal_of
-from usm_gym.scenario import PRESETS, Mode, named, sample
+from usm_gym.scenario import Mode, named, sample
 from usm_gym.seeding import EVALUATION, stream
 
 Array = NDArray[np.float64]

@@ -2,12 +2,13 @@
 
 from importlib.metadata import version
 
+from usm_gym.conditions import Conditions
 from usm_gym.dynamics import accelerations
 from usm_gym.evaluation import Evaluation, evaluate
 from usm_gym.metrics import max_error
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
-from usm_gym.scenario import Conditions, Inspection, Path, Scenario, Water
+from usm_gym.scenario import Inspection, Path, Scenario, Water
 from usm_gym.suites import suite
 
 __all__ = [

@@ -9,11 +9,12 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.conditions import Conditions, conditions_of
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.reward import reward, reward_of_loss
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named, sample
+from usm_gym.scenario import Mode, Scenario, named, sample
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.validation import require
 from usm_gym.viewer import RENDER_MODES, Viewer

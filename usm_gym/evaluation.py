@@ -229,8 +229,9 @@ def _run(
             f"({size}, {thrusters})",
         )
         alive = (k < ends) & ~lost
-        require(not np.isnan(action[alive]).any(), "the policy's action", "NaN", "numbers")
-        simulation.step(np.clip(np.nan_to_num(action), -1.0, 1.0))
+        missing = np.isnan(action)
+        require(not missing[alive].any(), "the policy's action", "NaN", "numbers")
+        simulation.step(np.clip(np.where(missing, 0.0, action), -1.0, 1.0))
         watch(simulation)
         error[k], heading[k] = simulation.error, simulation.heading_error
         command[k] = simulation.command

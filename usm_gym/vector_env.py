@@ -13,11 +13,12 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from usm_gym.conditions import Conditions, conditions_of
 from usm_gym.env import action_space, checked_action, infos, outcome, render_fps, scenario_of
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Conditions, Mode, Scenario, conditions_of, named
+from usm_gym.scenario import Mode, Scenario, named
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.validation import require
 from usm_gym.viewer import RENDER_MODES, Viewer
@@ -173,27 +174,15 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         rewards, terminated, truncated = outcome(simulation)
         rewards[waiting] = 0.0
         done = terminated | truncated
-        everyone = np.ones(self.num_envs, bool)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and done.any():
+        final: dict[str, Any] = {}
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            self._done = done
+        elif done.any():
             final = self._final(done)
             self._restart(done)
-            self._follow()
-            return (
-                simulation.observation.copy(),
-                rewards,
-                terminated,
-                truncated,
-                {**final, **self._infos(everyone)},
-            )
-        self._done = done
         self._follow()
-        return (
-            simulation.observation.copy(),
-            rewards,
-            terminated,
-            truncated,
-            self._infos(everyone),
-        )
+        told = {**final, **self._infos(np.ones(self.num_envs, bool))}
+        return simulation.observation.copy(), rewards, terminated, truncated, told
 
     def snapshot(self) -> VectorSnapshot:
         """Copy the whole state, the streams from which scenarios are drawn included."""

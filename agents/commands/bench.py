@@ -8,12 +8,11 @@ from dataclasses import asdict
 from typing import Any
 
 import gymnasium as gym
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents import benchmark
 from agents.benchmark import BATCH_PERIOD, ROBOTS, SINGLE_PERIOD, Figure, Task, summarise
-from agents.terminal import figures, output_console, progress_bar
+from agents.terminal import empty_table, figures, output_console, progress_bar
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
 from usm_gym.validation import require
@@ -63,7 +62,6 @@ def add_to(subparsers: Any) -> None:
         "bench",
         help="measure speed against peers",
         description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--rounds", type=int, default=15, metavar="N", help="default: 15")
     parser.add_argument("--growth", action="store_true", help="also links 4-64, robots 1-4096")
@@ -144,9 +142,7 @@ def whole_jobs() -> dict[str, tuple[Callable[[], float], int]]:
 
 def table(measured: dict[str, Figure], missing: list[str]) -> Table:
     """The figures for the terminal."""
-    rows = Table("figure", "what it is", box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("median", "smallest", "largest"):
-        rows.add_column(heading, justify="right")
+    rows = empty_table("figure", "what it is", numbers=("median", "smallest", "largest"))
     for name, meaning in MEANINGS.items():
         if name in measured:
             figure = measured[name]
@@ -158,9 +154,8 @@ def table(measured: dict[str, Figure], missing: list[str]) -> Table:
 
 def growth_table(rows: list[dict[str, float]]) -> Table:
     """How the cost grows."""
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("links", "robots", "threads", "ns per robot and step", "ns per link"):
-        table.add_column(heading, justify="right")
+    headings = ("links", "robots", "threads", "ns per robot and step", "ns per link")
+    table = empty_table(numbers=headings)
     for row in rows:
         counts = [str(row[key]) for key in ("links", "robots", "threads")]
         table.add_row(*counts, figures(row["ns"]), figures(row["ns"] / row["links"]))

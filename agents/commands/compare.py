@@ -13,6 +13,7 @@ from agents.selection import (
     POLICIES,
     add_scenarios,
     add_scoring,
+    by_name,
     chosen_scenarios,
     leave_if_refused,
     named,
@@ -21,7 +22,6 @@ from agents.selection import (
     tasks,
 )
 from agents.terminal import mm, output_console
-from baselines.scoring import Refusal
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
 from usm_gym.scenario import Scenario
@@ -66,7 +66,6 @@ def add_to(subparsers: Any) -> None:
         help="decide between two policies",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("first", metavar="A", help="policy, or file of results")
     parser.add_argument("second", metavar="B", help="policy, or file of results")
@@ -93,14 +92,10 @@ def run(arguments: argparse.Namespace) -> None:
     missing = [named(name) for name in names if name not in files]
     chosen = tasks(missing, scenarios, arguments.time_limit) if missing else []
     scores: dict[str, Scores] = {name: each.scores for name, each in files.items()}
-    refused = {}
-    for task, outcome in zip(chosen, scored(chosen, arguments), strict=True):
-        if isinstance(outcome, Refusal):
-            refused[task.contender.name] = outcome.reason
-        else:
-            found = outcome.per_episode
-            scores[task.contender.name] = {name: found[name].tolist() for name in SCORES}
+    found, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
+    for name, evaluation in found.items():
+        scores[name] = {key: evaluation.per_episode[key].tolist() for key in SCORES}
     first, second = (scores[name] for name in names)
     comparisons = {name: compare(first[name], second[name]) for name in SCORES}
     console = output_console()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents.selection import (
@@ -13,6 +12,7 @@ from agents.selection import (
     add_policies,
     add_scenarios,
     add_scoring,
+    by_name,
     chosen_contenders,
     chosen_scenarios,
     leave_if_refused,
@@ -21,8 +21,7 @@ from agents.selection import (
     suite_name,
     tasks,
 )
-from agents.terminal import figures, mm, output_console
-from baselines.scoring import Refusal
+from agents.terminal import empty_table, figures, mm, output_console
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
 
@@ -53,7 +52,6 @@ def add_to(subparsers: Any) -> None:
         help="score policies",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_policies(parser)
     add_scenarios(parser)
@@ -68,18 +66,18 @@ def run(arguments: argparse.Namespace) -> None:
         check_writable(arguments.output)
     scenarios = chosen_scenarios(arguments)
     chosen = tasks(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
-    results: dict[str, Any] = {}
-    refused: dict[str, str] = {}
-    for task, outcome in zip(chosen, scored(chosen, arguments), strict=True):
-        if isinstance(outcome, Refusal):
-            refused[task.contender.name] = outcome.reason
-        else:
-            results[task.contender.name] = outcome.summary()
+    found, refused = by_name(chosen, scored(chosen, arguments))
+    privileged = {task.contender.name for task in chosen if task.contender.privileged}
+    results = {
+        name: evaluation.summary() | {"competitor": name not in privileged}
+        for name, evaluation in found.items()
+    }
     name = suite_name(arguments)
     if results:
         output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))
     if arguments.output:
         document = {
+            "kind": "evaluation",
             "suite": name,
             "conditions": scenarios[0].to_dict()["conditions"],
             "conditions_override": arguments.conditions,
@@ -96,18 +94,12 @@ def run(arguments: argparse.Namespace) -> None:
 
 def table(results: dict[str, Any], title: str) -> Table:
     """The scores for the terminal, errors in mm."""
-    rows = Table(
+    errors = ("x", "y", "worst x", "worst y", "settled x", "settled y")
+    rows = empty_table(
         "policy",
+        numbers=(*errors, "thrust\nN", "variation\nN/s", "lost"),
         title=f"largest position error after settling, mm: mean [95 % interval] ({title})",
-        title_justify="left",
-        title_style="",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
     )
-    for heading in ("x", "y", "worst x", "worst y", "settled x", "settled y"):
-        rows.add_column(heading, justify="right")
-    for heading in ("thrust\nN", "variation\nN/s", "lost"):
-        rows.add_column(heading, justify="right")
     for name, row in results.items():
         cells = []
         for axis in "xy":

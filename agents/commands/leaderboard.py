@@ -48,7 +48,6 @@ def add_to(subparsers: Any) -> None:
         help="score every policy on every suite",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_policies(parser, default="all, also slow and privileged ones")
     add_scoring(parser)
@@ -70,6 +69,7 @@ def run(arguments: argparse.Namespace) -> None:
     chosen = cells(contenders, fronts, suites(), arguments.time_limit)
     outcomes = scored([cell.task for cell in chosen], arguments, folder / "cache")
     found = {
+        "kind": "leaderboard",
         "version": version("usm-gym"),
         **document(list(zip(chosen, outcomes, strict=True)), fronts),
         "provenance": provenance({"suites": list(NAMES)}),

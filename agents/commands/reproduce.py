@@ -7,11 +7,10 @@ import os
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents.options import output_folder
-from agents.terminal import figures, output_console, progress_bar
+from agents.terminal import empty_table, figures, output_console, progress_bar
 from baselines.reproduction import (
     HEADING_GAIN,
     IMPLICIT_STEP,
@@ -58,7 +57,6 @@ def add_to(subparsers: Any) -> None:
         help="regenerate the paper's Table 1 and figures",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("--output", metavar="DIR", help="folder for the table and the figures")
@@ -97,6 +95,7 @@ def run_table(folder: Path | None, step: float, names: list[str]) -> None:
         return
     scenario: dict[str, Scenario] = {mode: named("table1", mode) for mode in MODES}
     document = {
+        "kind": "reproduction",
         "step": step,
         "settle_time": scenario["operation"].settle_time,
         **result,
@@ -185,18 +184,13 @@ def lines(rows: dict[str, Any]) -> list[list[str]]:
     return found
 
 
-def plain_table(first: str, title: str) -> Table:
-    """An empty table for the terminal."""
-    return Table(
-        first, title=title, title_justify="left", title_style="", box=SIMPLE_HEAD, pad_edge=False
-    )
-
-
 def terminal_table(rows: dict[str, Any]) -> Table:
     """Table 1 for the terminal."""
-    shown = plain_table("mm", "absolute maximum of the position error after settling")
-    for part, axis in COLUMNS:
-        shown.add_column(f"{part}\n{axis}", justify="right")
+    shown = empty_table(
+        "mm",
+        numbers=(f"{part}\n{axis}" for part, axis in COLUMNS),
+        title="absolute maximum of the position error after settling",
+    )
     for line in lines(rows):
         shown.add_row(*line)
     return shown
@@ -204,9 +198,11 @@ def terminal_table(rows: dict[str, Any]) -> Table:
 
 def fit_table(found: dict[str, Any]) -> Table:
     """The numbers that the fit saw, and its freedoms, for the terminal."""
-    shown = plain_table("", "ours over the paper's at a step of 1e-5 s, and what was free")
-    for name in ("declared", "fitted"):
-        shown.add_column(name, justify="right")
+    shown = empty_table(
+        "",
+        numbers=("declared", "fitted"),
+        title="ours over the paper's at a step of 1e-5 s, and what was free",
+    )
     for part, printed in found["seen"].items():
         for index, axis in enumerate("xy"):
             cells = [

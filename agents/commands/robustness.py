@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents.options import output_folder
@@ -21,7 +20,7 @@ from agents.selection import (
     seeds,
     tasks,
 )
-from agents.terminal import mm, output_console
+from agents.terminal import empty_table, mm, output_console
 from baselines import robustness
 from baselines.robustness import QUANTITIES
 from usm_gym.files import write_json
@@ -51,7 +50,6 @@ def add_to(subparsers: Any) -> None:
         help="error against noise, lag, current, ...",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("--vary", choices=list(QUANTITIES), required=True, metavar="QUANTITY", help="which")
@@ -75,6 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
     outcomes = scored(chosen, arguments, folder / "cache")
     found = robustness.curves([each.name for each in contenders], values, outcomes)
     document = {
+        "kind": "robustness",
         "quantity": arguments.vary,
         "label": quantity.label,
         "values": list(values),
@@ -109,14 +108,10 @@ def parse_values(text: str) -> tuple[float, ...]:
 def table(found: dict[str, Any], label: str) -> Table:
     """Mean errors x / y in mm, a row for each policy."""
     values = [point["value"] for point in next(iter(found.values()))]
-    rows = Table(
+    rows = empty_table(
         "policy",
         *(f"{value:g}" for value in values),
         title=f"largest position error after settling, mm, x / y, against {label}",
-        title_justify="left",
-        title_style="",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
     )
     for name, points in found.items():
         rows.add_row(name, *map(cell, points))

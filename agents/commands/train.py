@@ -13,8 +13,8 @@ from usm_gym.validation import require
 
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
---policies takes, its learning curve on held-out scenarios of the training distribution, TensorBoard
-logs where TensorBoard is installed, and the last checkpoint. Frozen suites are never seen. The same
+--policies takes, its learning curve on held-out scenarios of the training distribution, logs for
+TensorBoard, and the last checkpoint. Frozen suites are never seen. The same
 command with --resume goes on from the last checkpoint. Needs the extra `agents`.
 """
 EXAMPLES = """\
@@ -29,8 +29,9 @@ OPTIONS = (
     ("algorithm", str, "A", "ppo, sac, td3 or tqc (default: ppo)"),
     ("env", str, "ID", "residual task (default: agents:USM-OperationResidual-v0)"),
     ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
-    ("residual_scale", float, "N", "largest residual, N and N m (default: 6)"),
+    ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),
     ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
+    ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of everything random (default: 0)"),
     ("steps", int, "N", "steps of all robots together (default: 3000000)"),
     ("interval", int, "N", "steps between checkpoints (default: 250000)"),
@@ -44,11 +45,11 @@ def add_to(subparsers: Any) -> None:
         help="train an agent",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     for name, kind, metavar, text in OPTIONS:
         add(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
+    add("--omit", metavar="A,B", help="entries of the observation that the agent is not shown")
     add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
     add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
     add("--resume", action="store_true", help="go on from the last checkpoint in that folder")
@@ -66,9 +67,11 @@ def run(arguments: argparse.Namespace) -> None:
     )
     from agents.training import PLAN, Plan, read_plan, train
 
-    names = [name for name, *_ in OPTIONS] + ["conditions"]
+    names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
     given = {name: getattr(arguments, name) for name in names}
     given = {name: value for name, value in given.items() if value is not None}
+    if "omit" in given:
+        given["omit"] = tuple(given["omit"].split(","))
     if "conditions" in given:
         given["conditions"] = parse_conditions(given["conditions"])
     if arguments.resume:

@@ -11,9 +11,10 @@ from typing import Any
 from agents.options import add_computing, computing, count, parse_conditions
 from agents.terminal import figures, output_console, progress_bar
 from baselines.gains import Budget
+from usm_gym.conditions import FIELD
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
-from usm_gym.scenario import FIELD, MODES
+from usm_gym.scenario import MODES
 from usm_gym.validation import require
 
 DESCRIPTION = """\
@@ -38,7 +39,6 @@ def add_to(subparsers: Any) -> None:
         help="look for better gains",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("policy", metavar="POLICY", help="id of a policy that declares a space of gains")

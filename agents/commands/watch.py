@@ -8,7 +8,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from agents.selection import (
@@ -18,7 +17,8 @@ from agents.selection import (
     chosen_contenders,
     chosen_scenario,
 )
-from agents.terminal import mm, output_console, progress_bar
+from agents.take import instants, take
+from agents.terminal import empty_table, mm, output_console, progress_bar
 from usm_gym.evaluation import Trajectory, score
 from usm_gym.files import check_writable
 from usm_gym.validation import require
@@ -48,7 +48,6 @@ def add_to(subparsers: Any) -> None:
         help="see policies at work, in a window or a film",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_policies(parser, default="sta")
     add_scenarios(parser, single=True)
@@ -80,11 +79,11 @@ def run(arguments: argparse.Namespace) -> None:
     require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
     scenario = chosen_scenario(arguments)
     fps = film.FPS[medium]
-    shown = film.instants(scenario, fps, speed)
+    shown = instants(scenario, fps, speed)
     with progress_bar() as bar:
         line = bar.add_task("simulate", total=len(contenders))
         takes = [
-            film.take(each, scenario, shown, lambda episodes: bar.advance(line, episodes))
+            take(each, scenario, shown, lambda episodes: bar.advance(line, episodes))
             for each in contenders
         ]
         made = film.Film(takes, len(shown), film.WIDTHS[medium][len(takes) - 1])
@@ -98,16 +97,11 @@ def run(arguments: argparse.Namespace) -> None:
 
 def table(trajectories: dict[str, Trajectory]) -> Table:
     """The errors of the episode in mm."""
-    rows = Table(
+    rows = empty_table(
         "policy",
+        numbers=("x", "y", "lost"),
         title="largest position error after settling, mm, in this episode",
-        title_justify="left",
-        title_style="",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
     )
-    for heading in ("x", "y", "lost"):
-        rows.add_column(heading, justify="right")
     for name, trajectory in trajectories.items():
         row = score(trajectory)
         errors = [mm(row[f"max_error_{axis}"]) for axis in "xy"]

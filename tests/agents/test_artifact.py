@@ -2,7 +2,6 @@
 
 import json
 import pickle
-import subprocess
 import sys
 from hashlib import sha256
 from itertools import pairwise
@@ -12,6 +11,7 @@ import pytest
 
 import usm_gym
 from agents.artifact import DESCRIPTION, WEIGHTS, agent_contender, make_agent, write_agent
+from agents.main import main
 from agents.network import Network
 from agents.residual import Residual, ResidualPolicy
 from usm_gym.nominal import nominal_of
@@ -40,6 +40,8 @@ def folder(tmp_path):
         "gains": residual.base.gains._asdict(),
         "residual_scale": 2.0,
         "action": "wrench",
+        "omit": [],
+        "frames": 1,
         "layout": residual.layout.fingerprint,
         "algorithm": "ppo",
         "seed": 0,
@@ -132,13 +134,14 @@ def test_a_spoilt_agent_is_refused_in_one_line(folder, spoil, message):
     assert "\n" not in str(caught.value)
 
 
-def test_the_command_line_takes_a_folder(folder, tmp_path):
-    code = "import sys; from agents.main import main; main(sys.argv[1:])"
-    command = [sys.executable, "-c", code, "evaluate", "--policies", str(folder), "--episodes", "1"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert answer.returncode == 0, answer.stderr
+def test_the_command_line_takes_a_folder(folder, capsys):
+    command = ["evaluate", "--policies", str(folder), "--episodes", "1"]
+    main(command)
+    assert "sampled, 1 episodes" in capsys.readouterr().out
     tampered(folder)
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert answer.returncode == 2
-    assert answer.stderr.count("\n") == 1
-    assert "SHA-256" in answer.stderr
+    with pytest.raises(SystemExit) as left:
+        main(command)
+    errors = capsys.readouterr().err
+    assert left.value.code == 2
+    assert errors.count("\n") == 1
+    assert "SHA-256" in errors

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from agents.main import main
+
 USM = Path(sys.executable).with_name("usm")
 
 
@@ -17,6 +19,17 @@ def usm(*arguments, **options):
     return subprocess.run(
         [USM, *arguments], capture_output=True, text=True, check=False, timeout=300, **options
     )
+
+
+def refused(capsys, *arguments):
+    """Return the one line that a command says as it leaves with status 2."""
+    with pytest.raises(SystemExit) as left:
+        main(list(arguments))
+    answer = capsys.readouterr()
+    assert left.value.code == 2
+    assert answer.out == ""
+    assert answer.err.count("\n") == 1
+    return answer.err
 
 
 def small_suite(folder, count=3):
@@ -41,9 +54,9 @@ def test_policies_lists_every_policy():
     assert all(id in answer.stdout for id in baselines.ids())
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("evaluate", "--help"), ("policies", "--help")])
-def test_help_teaches(arguments):
-    answer = usm(*arguments)
+@pytest.mark.parametrize("command", [[USM], [USM, "evaluate"], [sys.executable, "-m", "agents"]])
+def test_help_teaches(command):
+    answer = subprocess.run([*command, "--help"], capture_output=True, text=True, check=False)
     assert answer.returncode == 0
     assert "usage: usm" in answer.stdout
 
@@ -98,8 +111,7 @@ def test_results_do_not_depend_on_the_workers(tmp_path):
 def test_sampled_scenarios_come_from_the_seed(tmp_path):
     def scenarios(*arguments):
         output = tmp_path / "result.json"
-        answer = usm("evaluate", "--policies", "zero", *arguments, "--output", output)
-        assert answer.returncode == 0, answer.stderr
+        main(["evaluate", "--policies", "zero", *arguments, "--output", str(output)])
         data = json.loads(output.read_text())
         assert data["suite"] is None
         return data["scenarios"]
@@ -112,12 +124,13 @@ def test_sampled_scenarios_come_from_the_seed(tmp_path):
 
 def test_conditions_override_the_suites_own_and_are_marked(tmp_path):
     output = tmp_path / "result.json"
-    arguments = ("evaluate", "--policies", "zero", "--suite", small_suite(tmp_path), "--output")
-    usm(*arguments, output, "--conditions", "ideal")
+    arguments = ["evaluate", "--policies", "zero", "--suite", str(small_suite(tmp_path))]
+    arguments += ["--output", str(output), "--conditions"]
+    main([*arguments, "ideal"])
     data = json.loads(output.read_text())
     assert data["conditions_override"] == "ideal"
     assert {s["conditions"]["position_noise"] for s in data["scenarios"]} == {0.0}
-    usm(*arguments, output, "--conditions", '{"thruster_limit": 5.0}')
+    main([*arguments, '{"thruster_limit": 5.0}'])
     data = json.loads(output.read_text())
     assert {s["conditions"]["thruster_limit"] for s in data["scenarios"]} == {5.0}
 
@@ -144,39 +157,50 @@ def test_conditions_override_the_suites_own_and_are_marked(tmp_path):
         ([], "COMMAND"),
     ],
 )
-def test_bad_input_gets_one_line_and_status_2(arguments, message, tmp_path):
-    answer = usm(*arguments, cwd=tmp_path)
-    assert answer.returncode == 2
-    assert answer.stdout == ""
-    assert answer.stderr.count("\n") == 1
-    assert "error" in answer.stderr
-    assert message in answer.stderr
+def test_bad_input_gets_one_line_and_status_2(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    error = refused(capsys, *arguments)
+    assert "error" in error
+    assert message in error
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     "text", ["{", '{"scenarios": 3}', '{"scenarios": [{"mod": 1}]}', "[]", "\0"]
 )
-def test_a_broken_file_gets_one_line_and_status_2(text, tmp_path):
-    (tmp_path / "broken.json").write_text(text)
-    answer = usm("evaluate", "--suite", "broken.json", cwd=tmp_path)
-    assert answer.returncode == 2
-    assert answer.stderr.count("\n") == 1
+def test_a_broken_file_gets_one_line_and_status_2(text, tmp_path, capsys):
+    broken = tmp_path / "broken.json"
+    broken.write_text(text)
+    assert str(broken) in refused(capsys, "evaluate", "--suite", str(broken))
+
+
+WAITING = """
+import pathlib, time
+
+class Waiting:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        pathlib.Path("acting").touch()
+        time.sleep(60)
+"""
 
 
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
+    (tmp_path / "mine.py").write_text(WAITING)
     process = subprocess.Popen(
-        [USM, "evaluate", "--episodes", "3000", "--output", "result.json"],
+        [USM, "evaluate", "--policies", "mine:Waiting", "--output", "result.json"],
         cwd=tmp_path,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(5)
+    while not (tmp_path / "acting").exists():
+        assert process.poll() is None
+        time.sleep(0.01)
     os.kill(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert errors == "usm: interrupted\n"
-    assert list(tmp_path.iterdir()) == []
+    assert {file.name for file in tmp_path.iterdir()} == {"mine.py", "acting"}
 
 
 def test_a_closed_pipe_leaves_no_traceback():
@@ -186,12 +210,11 @@ def test_a_closed_pipe_leaves_no_traceback():
     assert answer.stderr == ""
 
 
-def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path):
-    (tmp_path / "file").write_text("")
-    for folder in ("file/folder", "file"):
-        answer = usm("reproduce", "--output", folder, cwd=tmp_path)
-        assert answer.returncode == 2
-        assert answer.stderr.count("\n") == 1
+def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path, capsys):
+    file = tmp_path / "file"
+    file.write_text("")
+    for folder in (file / "folder", file):
+        assert str(file) in refused(capsys, "reproduce", "--output", str(folder))
 
 
 @pytest.mark.parametrize(
@@ -208,11 +231,9 @@ def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path):
         (("--study", "--fit", "--output", "x"), "not allowed with"),
     ],
 )
-def test_reproduce_refuses_bad_input(arguments, message, tmp_path):
-    answer = usm("reproduce", *arguments, cwd=tmp_path)
-    assert answer.returncode == 2
-    assert message in answer.stderr
-    assert answer.stderr.count("\n") == 1
+def test_reproduce_refuses_bad_input(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert message in refused(capsys, "reproduce", *arguments)
     assert not list(tmp_path.iterdir())
 
 
@@ -241,7 +262,6 @@ def test_reproduce_writes_the_same_bits_twice(tmp_path):
     ("arguments", "message"),
     [(("--rounds", "0"), "--rounds is 0"), (("--output", "missing/b.json"), "missing")],
 )
-def test_bench_refuses_bad_input(arguments, message, tmp_path):
-    answer = usm("bench", *arguments, cwd=tmp_path)
-    assert answer.returncode == 2
-    assert message in answer.stderr
+def test_bench_refuses_bad_input(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert message in refused(capsys, "bench", *arguments)

@@ -13,7 +13,8 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import baselines
 import usm_gym
-from agents.residual import Residual, ResidualPolicy, make_residual_vector_env
+from agents.residual import Residual, ResidualPolicy
+from agents.residual_env import make_residual_vector_env
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
 
@@ -42,7 +43,7 @@ def test_checkers_have_no_complaint():
             check(gym.make(ID, disable_env_checker=True).env.env)
 
 
-@pytest.mark.parametrize("base", ["sta", "pd", "zero"])
+@pytest.mark.parametrize("base", ["sta", "pd", "lqg-joints", "zero"])
 def test_a_zero_residual_is_the_base_to_the_bit(base):
     plain, residual = gym.make("USM-Operation-v0"), gym.make(ID, base=base)
     policy = baselines.make(base, plain)
@@ -190,6 +191,38 @@ def test_what_is_seen_means_what_the_table_says():
     assert (np.abs(seen) <= layout.bound).all()
 
 
+def test_entries_are_left_out_and_earlier_frames_shown():
+    hidden = ("base_disturbance", "reference_deflection")
+    whole, less = gym.make(ID), gym.make(ID, omit=hidden)
+    framed = vector(2, frames=3, autoreset_mode="SameStep", conditions=HARD)
+    single = vector(2, autoreset_mode="SameStep", conditions=HARD)
+    complete, layout = (each.get_wrapper_attr("residual").layout for each in (whole, less))
+    assert set(complete.slices) - set(layout.slices) == set(hidden)
+    whole.reset(seed=0)
+    less.reset(seed=0)
+    random = np.random.default_rng(0)
+    frames = [single.reset(seed=0)[0]] * 3
+    assert (framed.reset(seed=0)[0] == np.concatenate(frames, axis=1)).all()
+    ends = 0
+    for _ in range(500):
+        action = random.uniform(-1, 1, (2, 3)).astype(np.float32)
+        seen, shown = whole.step(action[0])[0], less.step(action[0])[0]
+        for name, place in layout.slices.items():
+            assert (shown[place] == seen[complete.slices[name]]).all()
+        latest, _, terminated, truncated, info = single.step(action)
+        both, *_, its_info = framed.step(action)
+        done = terminated | truncated
+        ends += done.sum()
+        for index in np.flatnonzero(done):
+            assert (
+                its_info["final_obs"][index][-latest.shape[1] :] == info["final_obs"][index]
+            ).all()
+        frames = [np.where(done[:, None], latest, each) for each in (*frames[1:], latest)]
+        assert (both == np.concatenate(frames, axis=1)).all()
+    assert ends > 0
+    assert framed.residual.layout.fingerprint != single.residual.layout.fingerprint
+
+
 def test_the_kalman_filter_knows_better_than_the_measurement():
     envs = vector(16)
     part, scale = envs.residual.layout.slices, envs.residual.layout.scale
@@ -233,6 +266,10 @@ def test_arguments_survive_the_spec_and_bad_ones_are_refused():
         gym.make(ID, residual_scale=-1.0)
     with pytest.raises(ValueError, match="action is 'sideways'"):
         make_residual_vector_env(2, "operation", action="sideways")
+    with pytest.raises(ValueError, match="omit is 'nothing'"):
+        gym.make(ID, omit=("nothing",))
+    with pytest.raises(ValueError, match="frames is 0"):
+        gym.make(ID, frames=0)
 
 
 def test_torpedo_mode():

@@ -1,17 +1,15 @@
 """Training: goes on after an interruption to the bit, says when it diverges, leaves an agent."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
 
 import gymnasium as gym
 import numpy as np
 import pytest
 import torch
 from stable_baselines3 import PPO
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import usm_gym
 from agents import algorithms, training
@@ -21,11 +19,34 @@ from agents.training import DivergedError, Plan, train
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
 
-# Small: 16 robots, so that a rollout of PPO has 1024 steps; two validation episodes.
-SMALL = """
+# Trains in children that are killed after random times, and at last in one that is not. Children
+# are forked, so that each does not import everything again.
+KILLER = """
+import os, random, signal, sys, time
+from pathlib import Path
 from agents import training
-training.ROBOTS = {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4}
-training.VALIDATION_EPISODES = 2
+
+training.ROBOTS = {"ppo": 16}
+training.VALIDATION_EPISODES = training.TEST_EPISODES = 2
+plan, folder = training.Plan(steps=4096, interval=1024), Path(sys.argv[1])
+chance, steps, kills = random.Random(0), 0, 0
+while True:
+    child = os.fork()
+    if child == 0:
+        training.train(plan, folder, lambda steps, line: None)
+        os._exit(0)
+    if kills < 10:
+        time.sleep(chance.uniform(0.0, 4.0))
+        os.kill(child, signal.SIGKILL)
+        kills += 1
+    _, status = os.waitpid(child, 0)
+    kept = training.latest_checkpoint(folder)
+    reached = int(kept.name.partition("-")[2]) if kept else 0
+    assert reached >= steps, (reached, steps)
+    steps = reached
+    if status == 0:
+        break
+print(kills, steps)
 """
 PLAN = Plan(steps=4096, interval=1024)
 SILENT = lambda steps, line: None  # noqa: E731
@@ -35,27 +56,21 @@ SILENT = lambda steps, line: None  # noqa: E731
 def small(monkeypatch):
     monkeypatch.setattr(training, "ROBOTS", {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4})
     monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
+    monkeypatch.setattr(training, "TEST_EPISODES", 2)
 
 
 def errors(curve):
     return [(point["steps"], point["max_error_x"], point["max_error_y"]) for point in curve]
 
 
-def test_a_killed_training_goes_on_to_the_bit(tmp_path):
+def test_a_training_that_is_killed_ten_times_ends_with_the_same_bits(tmp_path):
     whole = train(PLAN, tmp_path / "whole", SILENT)
-    code = f"{SMALL}\nfrom pathlib import Path\nimport sys\n"
-    code += "plan = training.Plan(steps=4096, interval=1024)\n"
-    code += "training.train(plan, Path(sys.argv[1]), lambda steps, line: None)"
     folder = tmp_path / "killed"
-    process = subprocess.Popen([sys.executable, "-c", code, str(folder)])
-    while len(training.checkpoints(folder)) == 0 or len(read_curve(folder)) < 2:
-        assert process.poll() is None
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    assert len(read_curve(folder)) < len(whole)
-    resumed = train(training.read_plan(folder), folder, SILENT)
-    assert errors(resumed) == errors(whole)
+    answer = subprocess.run(
+        [sys.executable, "-c", KILLER, str(folder)], capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert errors(read_curve(folder)) == errors(whole)
     models = [
         PPO.load(training.latest_checkpoint(each) / "model.zip", device="cpu")
         for each in (tmp_path / "whole", folder)
@@ -71,10 +86,18 @@ def read_curve(folder):
         return []
 
 
+def test_the_log_has_the_metric_on_held_out_scenarios(tmp_path):
+    curve = train(PLAN, tmp_path, SILENT)
+    log = EventAccumulator(str(tmp_path)).Reload()
+    logged = [(each.step, each.value) for each in log.Scalars("validation/max_error_x")]
+    assert logged == [(each["steps"], np.float32(each["max_error_x"])) for each in curve]
+
+
 @pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
 def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeypatch):
-    settings = algorithms.OFF_POLICY | {"learning_starts": 100, "buffer_size": 1000}
-    monkeypatch.setattr(algorithms, "OFF_POLICY", settings)
+    settings = algorithms.SETTINGS[algorithm]
+    monkeypatch.setitem(settings, "learning_starts", 100)
+    monkeypatch.setitem(settings, "buffer_size", 1000)
     train(Plan(algorithm=algorithm, steps=200, interval=100), tmp_path, SILENT)
     curve = train(Plan(algorithm=algorithm, steps=300, interval=100), tmp_path, SILENT)
     assert [point["steps"] for point in curve] == [0, 100, 200, 300]
@@ -91,7 +114,7 @@ def test_a_network_is_what_the_model_does(algorithm):
         vectorization_mode="vector_entry_point",
         autoreset_mode="SameStep",
     )
-    model = algorithms.ALGORITHMS[algorithm](SB3VecEnv(envs))
+    model = algorithms.make_model(algorithm, SB3VecEnv(envs))
     with torch.no_grad():
         for each in model.policy.parameters():
             each.mul_(3.0)
@@ -103,12 +126,12 @@ def test_a_network_is_what_the_model_does(algorithm):
 
 
 def test_a_diverging_training_is_stopped_with_a_clear_word(tmp_path, monkeypatch):
-    def wild(env):
-        model = algorithms.ppo(env)
+    def wild(algorithm, env):
+        model = algorithms.make_model(algorithm, env)
         model.lr_schedule = lambda remaining: 1e30
         return model
 
-    monkeypatch.setitem(training.ALGORITHMS, "ppo", wild)
+    monkeypatch.setattr(training, "make_model", wild)
     with pytest.raises(
         DivergedError, match=r"diverged after \d+ steps: .*; the last checkpoint is"
     ):

@@ -18,6 +18,7 @@ import pytest
 import usm_gym
 from agents import film
 from agents.main import main
+from agents.take import instants, take
 from baselines.contender import contender
 from usm_gym.window import _windows
 
@@ -83,8 +84,8 @@ def test_a_film_plays(short, output, suffix, policies, speed, size, fps, frames)
 
 
 def test_two_policies_meet_the_same_scenario_and_noise():
-    shown = film.instants(SHORT, 25.0, 1.0)
-    takes = [film.take(contender(name), SHORT, shown) for name in ("sta", "pd")]
+    shown = instants(SHORT, 25.0, 1.0)
+    takes = [take(contender(name), SHORT, shown) for name in ("sta", "pd")]
     first, second = (each.pictures for each in takes)
     assert len(first) == len(second) == len(shown)
     assert (first[0].body.centres == second[0].body.centres).all()
@@ -94,17 +95,17 @@ def test_two_policies_meet_the_same_scenario_and_noise():
 
 
 def test_frames_keep_time_at_any_speed():
-    assert film.instants(SHORT, 25.0, 1.0) == list(range(0, 101, 2))
-    assert film.instants(SHORT, 25.0, 0.25)[:5] == [0, 0, 1, 2, 2]  # rounded half to even
-    assert film.instants(SHORT, 25.0, 2.0) == list(range(0, 101, 4))
-    assert film.instants(SHORT, 25.0, 1000.0) == [0, 100]
+    assert instants(SHORT, 25.0, 1.0) == list(range(0, 101, 2))
+    assert instants(SHORT, 25.0, 0.25)[:5] == [0, 0, 1, 2, 2]  # rounded half to even
+    assert instants(SHORT, 25.0, 2.0) == list(range(0, 101, 4))
+    assert instants(SHORT, 25.0, 1000.0) == [0, 100]
 
 
 def test_a_lost_robot_keeps_its_last_picture():
     away = dataclasses.replace(SHORT.path, speed=2.0)
     scenario = dataclasses.replace(SHORT, path=away)
-    shown = film.instants(scenario, 25.0, 1.0)
-    lost = film.take(contender("zero"), scenario, shown)
+    shown = instants(scenario, 25.0, 1.0)
+    lost = take(contender("zero"), scenario, shown)
     assert lost.trajectory.lost
     assert lost.pictures[-1].lost
     assert not any(each.lost for each in lost.pictures[:-1])
@@ -187,12 +188,12 @@ def test_a_closed_window_ends_the_show():
 
 
 def test_a_full_disk_leaves_one_line_and_no_file(output):
-    take = film.take(contender("sta"), SHORT, film.instants(SHORT, 25.0, 1.0))
+    taken = take(contender("sta"), SHORT, instants(SHORT, 25.0, 1.0))
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
     try:
         with pytest.raises(OSError, match="cannot write") as caught:
-            film.write(film.Film([take], 51, 640), output, 25.0)
+            film.write(film.Film([taken], 51, 640), output, 25.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert "\n" not in str(caught.value)

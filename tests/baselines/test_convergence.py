@@ -15,7 +15,8 @@ from baselines.convergence import (
 from baselines.paper_rate import Law, simulate
 from baselines.reproduction import at_step
 from baselines.super_twisting import SuperTwistingGains
-from usm_gym.scenario import PRESETS, named, sample
+from usm_gym.conditions import PRESETS
+from usm_gym.scenario import named, sample
 from usm_gym.seeding import TUNING, stream
 
 PAPER = SuperTwistingGains()

@@ -9,8 +9,9 @@ import pytest
 import baselines
 from agents.selection import chosen_contenders
 from usm_gym import Robot, evaluate
+from usm_gym.conditions import PRESETS
 from usm_gym.nominal import nominal_of
-from usm_gym.scenario import PRESETS, sample
+from usm_gym.scenario import sample
 from usm_gym.seeding import TUNING, stream
 
 ROBOT = Robot()

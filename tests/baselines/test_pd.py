@@ -14,7 +14,8 @@ import usm_gym
 from baselines import pd
 from baselines.pd import FORCE, MASS, OBSERVER, PDGains
 from usm_gym import Robot
-from usm_gym.scenario import PRESETS, named
+from usm_gym.conditions import PRESETS
+from usm_gym.scenario import named
 
 Array = NDArray[np.float64]
 

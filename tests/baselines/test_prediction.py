@@ -12,8 +12,9 @@ from baselines.mpc import forced_response, receding_gain
 from baselines.policy import Signals, model_of
 from baselines.prediction import Predictor
 from usm_gym import Robot, Scenario, evaluate
+from usm_gym.conditions import PRESETS
 from usm_gym.nominal import nominal_of
-from usm_gym.scenario import PRESETS, named
+from usm_gym.scenario import named
 from usm_gym.simulation import Simulation
 
 ROBOT = Robot()

@@ -11,8 +11,9 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 import baselines
 from baselines import registry
 from usm_gym import Water
+from usm_gym.conditions import PRESETS
 from usm_gym.nominal import Nominal, nominal_of
-from usm_gym.scenario import PRESETS, named, sample
+from usm_gym.scenario import named, sample
 
 SCRIPTED = ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero")
 RIVALS = ("pid", "ladrc", "lqg", "lqg-joints", "mpc", "smc", "gsta", "agsta")

@@ -186,17 +186,22 @@ for outcome in scoring.score_all(tasks, cache=Path(sys.argv[1])):
 """
 
 
+def whole_files(folder: Path) -> list[Path]:
+    """Return the scores in a folder, without what a killed process was about to write."""
+    return [file for file in folder.glob("*.json") if ".part" not in file.name]
+
+
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     tests = str(Path(__file__).parents[1])
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([tests, *sys.path])}
     command = [sys.executable, "-c", KILLED]
     process = subprocess.Popen([*command, tmp_path / "killed"], env=environment)
-    while len(list((tmp_path / "killed").glob("*.json"))) < 3:
+    while len(whole_files(tmp_path / "killed")) < 3:
         assert process.poll() is None
         time.sleep(0.01)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    kept = {file: file.stat().st_mtime_ns for file in (tmp_path / "killed").glob("*.json")}
+    kept = {file: file.stat().st_mtime_ns for file in whole_files(tmp_path / "killed")}
     assert 3 <= len(kept) < 8
     assert all(json.loads(file.read_text())["failed"] for file in kept)
     scores = [
@@ -205,4 +210,4 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     ]
     assert scores[0] == scores[1]
     assert all(file.stat().st_mtime_ns == then for file, then in kept.items())
-    assert len(list((tmp_path / "killed").glob("*.json"))) == 8
+    assert len(whole_files(tmp_path / "killed")) == 8

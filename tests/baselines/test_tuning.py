@@ -18,8 +18,9 @@ from baselines.gains import Budget
 from baselines.space import Range
 from baselines.tuning import Problem, objective, tune
 from usm_gym import suites
+from usm_gym.conditions import FIELD
 from usm_gym.evaluation import METRICS, Evaluation
-from usm_gym.scenario import FIELD, STILL
+from usm_gym.scenario import STILL
 from usm_gym.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION
 
 SPACE = {

@@ -12,21 +12,21 @@ import usm_gym
 from usm_gym.plant import compile as compiling
 
 PACKAGE = Path(usm_gym.__file__).parent
-ACCELERATIONS = """
+POSITIONS = """
 import numpy as np
 import usm_gym
-from usm_gym.plant.chain import accelerate_one
-answer = usm_gym.accelerations(
-    usm_gym.Robot(), np.arange(16) / 7, np.ones(16), (0.1, 0.2), np.ones(15), np.ones(5)
-)
-misses = sum(accelerate_one.stats.cache_misses.values())
-print(misses, usm_gym.__file__, *(float(x).hex() for part in answer for x in part), sep="\\n")
+from usm_gym.plant.motion import path_positions
+positions = np.empty((16, 2))
+path_positions(np.arange(16.0), 0.1, 0.2, 1.0, 2.0, positions)
+misses = sum(path_positions.stats.cache_misses.values())
+print(misses, usm_gym.__file__, *(float(x).hex() for x in positions.ravel()), sep="\\n")
 """
 FLEET = """
 import hashlib
 import numpy as np
 from usm_gym import Robot
-from usm_gym.scenario import PRESETS, sample
+from usm_gym.conditions import PRESETS
+from usm_gym.scenario import sample
 from usm_gym.simulation import Simulation
 draw = np.random.default_rng(0)
 for size in (1, 3):
@@ -56,8 +56,8 @@ def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(tmp_path)
     copy = tmp_path / "usm_gym"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     environment = {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
-    cold = run(ACCELERATIONS, **environment)
-    warm = run(ACCELERATIONS, **environment)
+    cold = run(POSITIONS, **environment)
+    warm = run(POSITIONS, **environment)
     assert cold[1] == warm[1] == str(copy / "__init__.py")
     assert (cold[0], warm[0]) == ("1", "0")
     assert cold[2:] == warm[2:]
@@ -66,7 +66,7 @@ def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(tmp_path)
     source = helper.read_text()
     assert source.count("half = 0.5 * z") == 1
     helper.write_text(source.replace("half = 0.5 * z", "half = 0.25 * z"))
-    edited = run(ACCELERATIONS, **environment)
+    edited = run(POSITIONS, **environment)
     assert edited[0] == "1"
     assert edited[2:] != warm[2:]
 

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 
 import usm_gym
 from usm_gym import Conditions, Inspection, Robot, Scenario, Water
-from usm_gym.scenario import PRESETS, named, sample
+from usm_gym.conditions import PRESETS
+from usm_gym.scenario import named, sample
 from usm_gym.simulation import Simulation
 
 Array = NDArray[np.float64]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 import baselines
 import usm_gym
 from usm_gym import Inspection, Path, Robot, Scenario, Thruster, metrics
+from usm_gym.conditions import PRESETS
 from usm_gym.evaluation import METRICS, POSITION_METRICS, Evaluation, rollout
-from usm_gym.scenario import PRESETS, sample
+from usm_gym.scenario import sample
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from usm_gym import Conditions, Scenario, suite
-from usm_gym.scenario import MODES, NOISE, PRESETS, WATER, Mode, conditions_of, named, sample
+from usm_gym.conditions import PRESETS, conditions_of
+from usm_gym.scenario import MODES, NOISE, WATER, Mode, named, sample
 from usm_gym.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.suites import NAMES
 from usm_gym.suites import __main__ as writer

@@ -6,8 +6,9 @@ import json
 import sys
 from pathlib import Path
 
+from usm_gym.conditions import PRESETS
 from usm_gym.files import write_text
-from usm_gym.scenario import MODES, PRESETS, Mode, Scenario, named, sample
+from usm_gym.scenario import MODES, Mode, Scenario, named, sample
 from usm_gym.seeding import SUITE, stream
 from usm_gym.suites import NAMES
 from usm_gym.validation import require

@@ -1,0 +1,85 @@
+"""`usm study`: train and compare agents."""
+
+from __future__ import annotations
+
+import argparse
+from importlib.util import find_spec
+from typing import Any
+
+from rich.markdown import Markdown
+
+from agents.options import add_computing, computing, output_folder
+from agents.terminal import output_console, progress_bar
+from usm_gym.files import write_json, write_text
+from usm_gym.provenance import provenance
+from usm_gym.validation import require
+
+DESCRIPTION = """\
+Train the agents that are shipped, and others that lack one thing each, under several seeds; score
+them and the classical policies on unseen scenarios, at home and elsewhere; and look at what the
+agents do to their bases. Writes study.json, study.md and figures (extra `render`) into a folder,
+and each training into a folder of its own in `runs` there. An interrupted study goes on where it
+stopped, also within a training. Takes hours on two cores. Needs the extra `agents`.
+"""
+EXAMPLES = """\
+examples:
+  usm study residual --workers 2                             all of it
+  usm study residual --only residual-ppo,rl-only --seeds 2   two agents under two seeds
+  usm study residual --only reference,scale-3 --steps 20000 --output try
+"""
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "study",
+        help="train and compare agents",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument
+    add("subject", choices=["residual"], help="what is studied")
+    add("--only", metavar="A,B", help="some agents and ablations, by name (default: all)")
+    add("--seeds", type=int, default=5, metavar="N", help="seeds of each, at most")
+    add("--steps", type=int, metavar="N", help="steps of each training (default: each its own)")
+    add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
+    add_computing(parser)
+    add("--output", default="results/study", metavar="DIR", help="default: results/study")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train, score, write the folder, print the tables."""
+    require(
+        find_spec("sb3_contrib") is not None,
+        "usm study",
+        arguments.subject,
+        "nothing, until Stable-Baselines3 is installed (the extra `agents`)",
+    )
+    from agents import study, study_page
+    from agents.training import TEST_SEED
+
+    for name, least in (("seeds", 1), ("episodes", 2), ("steps", 1)):
+        value = getattr(arguments, name)
+        require(value is None or value >= least, f"--{name}", value, f"{least} or more")
+    names = list(study.PLANS) if arguments.only is None else arguments.only.split(",")
+    folder = output_folder(arguments.output)
+    runs = study.runs(names, arguments.seeds, folder, arguments.steps)
+    with computing(arguments) as workers, progress_bar() as bar:
+        line = bar.add_task("trainings", total=len(runs))
+        study.train_all(runs, workers, lambda run: bar.advance(line))
+        tasks = study.tasks(runs, study.RIVALS, arguments.episodes)
+        line = bar.add_task("episodes", total=sum(len(task.scenarios) for task in tasks.values()))
+        cache = folder / "cache"
+        scores = study.score(tasks, workers, cache, lambda episodes: bar.advance(line, episodes))
+        found = {
+            **study.document(runs, scores, study.RIVALS),
+            "episodes": arguments.episodes,
+            "dissected": study.dissected(runs),
+            "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
+        }
+    write_json(folder / "study.json", found)
+    text = study_page.markdown(found)
+    write_text(folder / "study.md", text)
+    study_page.draw_all(found, folder)
+    output_console().print(Markdown(text))

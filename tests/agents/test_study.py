@@ -1,0 +1,90 @@
+"""The study of agents: what it trains, that it goes on where it stopped, and what its rows say."""
+
+import json
+
+import numpy as np
+import pytest
+
+from agents import study, training
+from agents.dissection import lateness
+from agents.main import main
+from agents.study import PLANS, runs
+from usm_gym.conditions import FIELD
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    monkeypatch.setattr(training, "ROBOTS", {"ppo": 16})
+    monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
+    monkeypatch.setattr(training, "TEST_EPISODES", 2)
+    monkeypatch.setattr(study, "RIVALS", ("sta", "zero"))
+    monkeypatch.setattr(study, "TRANSFER", {"still": study.TRANSFER["still"]})
+    monkeypatch.setattr(study, "DISSECTED_EPISODES", 1)
+
+
+def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "study"
+    command = ["study", "residual", "--only", "residual-ppo,reference", "--seeds", "1"]
+    command += ["--steps", "1024", "--episodes", "4", "--output", str(folder)]
+    main(command)
+    found = json.loads((folder / "study.json").read_text())
+    assert list(found["rows"]) == ["residual-ppo", "reference"]
+    assert [name for name, each in found["rows"].items() if each["agent"]] == ["residual-ppo"]
+    scores = found["rows"]["residual-ppo"]["scores"]
+    assert set(scores) == {"field", "still"}
+    assert set(found["rows"]["reference"]["scores"]) == {"field"}
+    for name in ("study.md", "curves.png", "front.png", "spectra.png"):
+        assert (folder / name).stat().st_size > 0
+    dissected = found["dissected"]["residual-ppo"]["x"]["deviation"]
+    assert dissected["base alone"] > dissected["needed"] > 0.0
+
+    # The same scores as `usm evaluate` gives.
+    out = tmp_path / "scores.json"
+    agent = str(folder / "runs" / "residual-ppo-0")
+    chosen = ["--policies", agent, "--seed", "7", "--episodes", "4"]
+    main(["evaluate", *chosen, "--output", str(out)])
+    again = json.loads(out.read_text())["results"][agent]["per_episode"]["max_error_x"]
+    assert scores["field"]["per_episode"]["max_error_x"] == again
+
+    page = tmp_path / "page.html"
+    main(["report", str(folder / "study.json"), "--policies", "sta,zero", "--output", str(page)])
+    text = page.read_text()
+    assert "Learning curves" in text
+    assert "residual-ppo" in text
+
+    # What is done is not done again; another training in its place is refused.
+    monkeypatch.setattr(study, "train_one", None)
+    main(command)
+    capsys.readouterr()
+    with pytest.raises(SystemExit, match="2"):
+        main(["2048" if word == "1024" else word for word in command])
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert "--steps 1024" in message
+    assert "--steps 2048" in message
+
+
+def test_every_seed_has_its_own_training_and_early_seeds_come_first(tmp_path):
+    found = runs(list(PLANS), 5, tmp_path)
+    assert [run.plan.seed for run in found] == sorted(run.plan.seed for run in found)
+    assert len({run.folder for run in found}) == len(found)
+    for name in PLANS:
+        seeds = [run.plan.seed for run in found if run.name == name]
+        assert seeds == list(range(study.SEEDS[name]))
+    assert study.SEEDS["residual-ppo"] == 5
+    with pytest.raises(ValueError, match="--only is 'nobody'"):
+        runs(["nobody"], 1, tmp_path)
+
+
+def test_plans_differ_from_the_reference_in_what_they_are_named_for():
+    reference = PLANS["reference"]
+    assert PLANS["no-randomisation"].conditions != FIELD
+    for name in ("thrusters", "scale-3", "no-kalman-states", "no-joint-references"):
+        assert PLANS[name] != reference
+        assert PLANS[name].steps == reference.steps
+
+
+def test_lateness_is_found():
+    needed = np.random.default_rng(0).normal(size=(400, 3))
+    assert lateness(np.roll(needed, 4, axis=0), needed) == 4
+    assert lateness(np.roll(needed, -3, axis=0), needed) == -3
