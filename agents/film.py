@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -13,16 +14,23 @@ import numpy as np
 
 from agents.take import Take
 from usm_gym.files import replacing
-from usm_gym.rendering import Canvas, Frame, Window, error_scale
+from usm_gym.rendering import Canvas, Frame, error_scale
+from usm_gym.window import Window
+
+# It warns of films that Ctrl-C has ended before their first frame; they are removed anyway.
+logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
 
 # Frames per second of each medium, and how wide a policy's frame is: alone, and beside another.
 # A GIF's times are multiples of 0.01 s, and it grows fast.
 FPS = {".mp4": 25.0, ".gif": 12.5, "window": 50.0}
-WIDTHS = {".mp4": (960, 640), ".gif": (640, 640), "window": (960, 640)}
-# Each frame of a GIF has its own palette, so that a film of any length takes little memory.
+WIDTHS = {".mp4": (960, 640), ".gif": (640, 480), "window": (960, 640)}
+# A GIF has one palette, so that a frame holds only what differs from the one before. It is made of
+# a few frames that are sent ahead, lest the encoder keep the whole film to find its colours.
+AHEAD = 8
 GIF = (
-    "split[a][b];[a]palettegen=stats_mode=single:max_colors=96[p];"
-    "[b][p]paletteuse=new=1:dither=none"
+    f"split[a][b];[a]trim=end_frame={AHEAD},palettegen=max_colors=64[p];"
+    f"[b]trim=start_frame={AHEAD},setpts=PTS-STARTPTS[c];"
+    "[c][p]paletteuse=dither=none:diff_mode=rectangle"
 )
 
 
@@ -61,9 +69,11 @@ def write(
         OSError: If it cannot be written.
     """
     options: dict[str, Any]
+    ahead: list[int] = []
     if path.suffix == ".gif":
         options = {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-vf", GIF]}
         options |= {"quality": None, "macro_block_size": 1}
+        ahead = np.linspace(0, film.length - 1, AHEAD).astype(int).tolist()
     else:
         options = {"codec": "libx264", "quality": 6}
         options |= {"output_params": ["-preset", "veryfast", "-movflags", "+faststart"]}
@@ -75,6 +85,8 @@ def write(
                 )
             ) as writer:
                 writer.send(None)
+                for index in ahead:
+                    writer.send(film.frame(index))
                 for index in range(film.length):
                     writer.send(film.frame(index))
                     progress(1)

@@ -13,7 +13,7 @@ from usm_gym.simulation import Simulation
 from usm_gym.validation import require
 
 if TYPE_CHECKING:
-    from usm_gym.rendering import Window
+    from usm_gym.window import Window
 
 RENDER_MODES = ("human", "rgb_array")
 
@@ -49,7 +49,8 @@ class Viewer:
 
     def render(self, simulation: Simulation) -> NDArray[np.uint8] | None:
         """An image of the present, (height, width, 3); None where a window shows it."""
-        from usm_gym.rendering import Canvas, Window
+        from usm_gym.rendering import Canvas
+        from usm_gym.window import Window
 
         self._canvas = self._canvas or Canvas()
         scenario = simulation.scenarios[self._index]

@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> None:
             raise ValueError(f"usm watch needs {package}: pip install 'usm-gym[render]'")
     # These need the extra.
     from agents import film
-    from usm_gym.rendering import has_display
+    from usm_gym.window import has_display
 
     speed, path = arguments.speed, arguments.output and Path(arguments.output)
     require(0 < speed < math.inf, "--speed", speed, "a number > 0")

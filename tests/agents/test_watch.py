@@ -20,7 +20,7 @@ from agents import film
 from agents.main import main
 from agents.take import instants, take
 from baselines.contender import contender
-from usm_gym import rendering
+from usm_gym.window import _windows
 
 USM = Path(sys.executable).with_name("usm")
 SHORT = dataclasses.replace(usm_gym.suite("operation")[1], duration=2.0, settle_time=0.5)
@@ -171,7 +171,7 @@ def test_a_window_shows_the_episode_to_its_end(short):
 
 
 def test_a_closed_window_ends_the_show():
-    others = set(rendering._windows)
+    others = set(_windows)
 
     class Endless:
         size, length, drawn = (64, 48), 10**9, 0
@@ -179,12 +179,12 @@ def test_a_closed_window_ends_the_show():
         def frame(self, index):
             self.drawn += 1
             if self.drawn == 3:
-                (window,) = rendering._windows - others
+                (window,) = _windows - others
                 pygame.event.post(pygame.Event(pygame.WINDOWCLOSE, window=window))
             return np.zeros((48, 64, 3), np.uint8)
 
     film.play(Endless(), 1000.0)
-    assert rendering._windows == others
+    assert _windows == others
 
 
 def test_a_full_disk_leaves_one_line_and_no_file(output):

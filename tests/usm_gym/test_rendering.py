@@ -14,6 +14,7 @@ import usm_gym
 from usm_gym import rendering
 from usm_gym.picture import Recorder
 from usm_gym.rendering import HEAD, JET_CORE, REFERENCE, SCENE, TAIL, TRAIL, Canvas
+from usm_gym.window import _windows
 
 ID = "USM-Operation-v0"
 
@@ -182,13 +183,13 @@ def test_the_frame_rate_is_the_control_rate():
 def test_a_window_that_is_closed_by_hand_ends_nothing():
     import pygame
 
-    others = set(rendering._windows)
+    others = set(_windows)
     env, _ = episode(2, render_mode="human")
     assert env.render() is None
-    (window,) = rendering._windows - others
+    (window,) = _windows - others
     pygame.event.post(pygame.Event(pygame.WINDOWCLOSE, window=window))
     env.step(np.zeros(5, np.float32))
-    assert rendering._windows == others
+    assert _windows == others
     env.step(np.zeros(5, np.float32))
     env.close()
 
@@ -199,7 +200,7 @@ def test_a_hundred_environments_leave_nothing_behind(render_mode):
     def left():
         gc.collect()
         files, threads = os.listdir("/proc/self/fd"), os.listdir("/proc/self/task")
-        return len(files), len(threads), set(rendering._windows)
+        return len(files), len(threads), set(_windows)
 
     def use():
         env = gym.make(ID, render_mode=render_mode)

@@ -1,0 +1,128 @@
+"""Smooth lines, shapes and words on a frame (needs the extra `render`)."""
+
+from __future__ import annotations
+
+import io
+import os
+from functools import cache, lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+import matplotlib
+import pygame
+
+Points = NDArray[np.float64]
+Colour = tuple[int, int, int]
+
+INK, PAPER = (38, 50, 56), (255, 255, 255)
+# Each panel is drawn so many times as large and scaled down, which smooths all edges; words are
+# smooth by themselves.
+OVER = 2
+LEFT, MIDDLE, RIGHT = 0.0, 0.5, 1.0
+
+
+class Panel:
+    """A part of a frame. Places and widths are in points of the frame, whatever its size."""
+
+    def __init__(self, area: pygame.Rect, unit: float, colour: Colour = PAPER) -> None:
+        """Prepare to draw on an area, in points of `unit` pixels, over a colour."""
+        self._area = area
+        self._scale = OVER * unit
+        self._pixels = pygame.Rect([round(unit * each) for each in area])
+        width, height = self._pixels.size
+        self._surface = pygame.Surface((OVER * width, OVER * height))
+        self._surface.fill(colour)
+        self._background = self._surface.copy()
+
+    def keep(self) -> None:
+        """Make what has been drawn the background."""
+        self._background.blit(self._surface, (0, 0))
+
+    def clear(self) -> None:
+        """Leave nothing but the background."""
+        self._surface.blit(self._background, (0, 0))
+
+    def show(self, frame: pygame.Surface) -> None:
+        """Put it in its place on a frame."""
+        place = frame.subsurface(self._pixels)
+        pygame.transform.smoothscale(self._surface, place.get_size(), place)
+
+    def disc(self, at: Points, radius: float, colour: Colour) -> None:
+        """Draw a disc, or one at each of several points."""
+        for middle in np.atleast_2d(self._at(at)).tolist():
+            pygame.draw.circle(self._surface, colour, middle, radius * self._scale)
+
+    def line(self, points: Points, width: float, colour: Colour) -> None:
+        """Draw a line through at least two points."""
+        if len(points) > 1:
+            corners = self._at(points).tolist()
+            pygame.draw.lines(self._surface, colour, False, corners, self._thick(width))
+
+    def dashes(self, x: float, top: float, bottom: float, colour: Colour) -> None:
+        """Draw a vertical line of dashes."""
+        for y in np.arange(top, bottom, 6.0):
+            self.line(np.array([[x, y], [x, y + 3]]), 1.0, colour)
+
+    def outline(self, points: Points, width: float, colour: Colour) -> None:
+        """Draw the edge of a polygon."""
+        corners = self._at(points).tolist()
+        pygame.draw.polygon(self._surface, colour, corners, self._thick(width))
+
+    def shape(self, points: Points, colour: Colour, edge: Colour) -> None:
+        """Draw a polygon with its edge."""
+        corners = self._at(points).tolist()
+        pygame.draw.polygon(self._surface, colour, corners)
+        pygame.draw.aalines(self._surface, edge, True, corners)
+
+    def block(self, area: pygame.Rect, colour: Colour) -> None:
+        """Fill an upright rectangle."""
+        corner = self._at(np.array(area.topleft)).tolist()
+        size = (self._scale * area.width, self._scale * area.height)
+        pygame.draw.rect(self._surface, colour, pygame.Rect(corner, size))
+
+    def centre_of_mass(self, at: Points) -> None:
+        """Draw the usual sign: a disc in quarters."""
+        radius = 6.0
+        self.disc(at, radius + 1.2, INK)
+        self.disc(at, radius, PAPER)
+        quarters = {"draw_top_right": True, "draw_bottom_left": True}
+        centre = self._at(at).tolist()
+        pygame.draw.circle(self._surface, INK, centre, radius * self._scale, **quarters)
+
+    def _at(self, points: Points) -> Points:
+        return np.asarray((points - self._area.topleft) * self._scale)
+
+    def _thick(self, width: float) -> int:
+        return max(1, round(width * self._scale))
+
+
+def write(
+    frame: pygame.Surface,
+    unit: float,
+    text: str,
+    at: tuple[float, float],
+    size: int,
+    colour: Colour,
+    align: float = LEFT,
+) -> float:
+    """Write words on a frame, in points of `unit` pixels; tells where they end."""
+    image = _words(text, round(size * unit), colour)
+    x = at[0] * unit - align * image.get_width()
+    frame.blit(image, (round(x), round(at[1] * unit)))
+    return (x + image.get_width()) / unit
+
+
+@lru_cache(maxsize=128)
+def _words(text: str, size: int, colour: Colour) -> pygame.Surface:
+    return _font(size).render(text, True, colour)
+
+
+@cache
+def _font(size: int) -> pygame.font.Font:
+    # From memory, for a font keeps its file open.
+    file = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    pygame.font.init()
+    return pygame.font.Font(io.BytesIO(file.read_bytes()), size)

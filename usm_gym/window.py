@@ -1,0 +1,68 @@
+"""Windows that show frames (needs the extra `render`)."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from numpy.typing import NDArray
+
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+import pygame
+
+
+class Window:
+    """A window that shows frames; closing it by hand makes `show` do nothing from then on."""
+
+    def __init__(self, size: tuple[int, int], title: str) -> None:
+        """Open it."""
+        if not pygame.display.get_init():
+            pygame.display.init()
+        self._window = pygame.Window(title, size)
+        self._clock = pygame.time.Clock()
+        _windows.add(self._window)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is gone."""
+        return self._window not in _windows
+
+    def show(self, frame: NDArray[np.uint8], fps: float) -> None:
+        """Show a frame, (height, width, 3), no earlier than 1 / fps seconds after the last."""
+        for event in pygame.event.get():
+            if event.type == pygame.WINDOWCLOSE or (
+                event.type == pygame.KEYDOWN and event.key in (pygame.K_ESCAPE, pygame.K_q)
+            ):
+                _close(event.window)
+        if self.closed:
+            return
+        image = pygame.image.frombuffer(frame.data, frame.shape[1::-1], "RGB")
+        self._window.get_surface().blit(image, (0, 0))
+        self._window.flip()
+        self._clock.tick(fps)
+
+    def close(self) -> None:
+        """Close it, and with the last one the connection to the display."""
+        _close(self._window)
+
+
+_windows: set[pygame.Window] = set()
+
+
+def has_display() -> bool:
+    """Whether a window could be seen; elsewhere they are drawn into memory."""
+    pygame.display.init()
+    try:
+        return pygame.display.get_driver() != "offscreen"
+    finally:
+        if not _windows:
+            pygame.display.quit()
+
+
+def _close(window: pygame.Window | None) -> None:
+    if window not in _windows:
+        return
+    _windows.remove(window)
+    window.destroy()
+    if not _windows:
+        pygame.display.quit()
