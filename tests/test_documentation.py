@@ -1,0 +1,83 @@
+"""The pages do what they say: every block of code runs, and the site builds."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from markdown_it import MarkdownIt
+
+from agents.main import main
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+# Options that are added to a command, by how it begins: the later one counts.
+BUDGETS = {
+    "usm policies": "",
+    "usm evaluate": "--mode operation --episodes 2",
+    "usm compare": "--mode operation --episodes 2",
+    "usm robustness": "--values 0.05 --episodes 2",
+    "usm tune": "--trials 2 --episodes 2",
+    "usm leaderboard": "--policies zero,pd --workers 1",
+    "usm watch": "--speed 40",
+    "usm train": "--steps 1024",
+    "usm bench": "--help",  # no budget makes it short
+}
+# CI installs, and runs these in a clone of its own.
+INSTALLATION = ("python3 -m venv", "pip install", "mkdocs")
+
+
+def blocks(page):
+    """The blocks of code of a page: language, text, the line before it."""
+    before = ""
+    for token in MarkdownIt().parse(page.read_text(encoding="utf-8")):
+        if token.type in ("fence", "code_block"):
+            yield token.info or "sh", token.content, before
+        before = token.content or before
+
+
+def budgeted(line):
+    """The arguments of a command line, within its budget."""
+    name = next((name for name in BUDGETS if line.startswith(name)), None)
+    assert name is not None, f"no budget for {line!r}"
+    return shlex.split(line, comments=True)[1:] + shlex.split(BUDGETS[name])
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the files that the pages tell a reader to save, and the README."""
+    for page in PAGES:
+        for _, text, before in blocks(page):
+            if saved := re.match(r"Save this as `(.+)`", before):
+                (tmp_path / saved[1]).write_text(text, encoding="utf-8")
+    (tmp_path / "README.md").write_bytes((ROOT / "README.md").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if any(blocks(page))], ids=lambda p: p.stem
+)
+def test_every_block_of_a_page_runs(page, folder):
+    namespace = {}
+    for language, text, _ in blocks(page):
+        assert language in ("python", "sh", "text"), language
+        if language == "python":
+            exec(compile(text, page.name, "exec"), namespace)
+        elif language == "sh":
+            for line in text.splitlines():
+                if not line.startswith(INSTALLATION):
+                    main(budgeted(line))
+
+
+def test_the_site_builds_without_a_warning(tmp_path):
+    commands = pytest.importorskip("mkdocs.commands.build")
+    config = pytest.importorskip("mkdocs.config").load_config(
+        str(ROOT / "mkdocs.yml"), strict=True, site_dir=str(tmp_path)
+    )
+    config.plugins.run_event("startup", command="build", dirty=False)
+    commands.build(config)
+    pages = list(tmp_path.rglob("*.html"))
+    assert "<math" in (tmp_path / "model" / "index.html").read_text(encoding="utf-8")
+    assert not [page for page in pages if "arithmatex" in page.read_text(encoding="utf-8")]
