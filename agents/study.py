@@ -50,7 +50,7 @@ AGENTS: dict[str, Plan] = {
     "residual-lqg-joints": Plan(base="lqg-joints-tuned", steps=1_500_000),
     "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_000_000),
     "rl-only": Plan(base="zero", steps=2_000_000),
-    "residual-sac": Plan(algorithm="sac", steps=250_000),
+    "residual-sac": Plan(algorithm="sac", residual_scale=6.0, steps=400_000),
 }
 
 _SHORT = Plan(steps=1_000_000)
@@ -77,7 +77,7 @@ ABLATIONS: dict[str, Plan] = {
 }
 PLANS = AGENTS | ABLATIONS
 # Seeds of each training at most, so that all of it takes two hours on two cores.
-SEEDS = dict.fromkeys(PLANS, 1) | {"residual-ppo": 5}
+SEEDS = dict.fromkeys(PLANS, 1) | {"residual-ppo": 3}
 
 # Classical policies beside which the agents stand.
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
