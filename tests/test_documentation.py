@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,8 @@ BUDGETS = {
     "usm leaderboard": "--policies zero,pd --workers 1",
     "usm watch": "--speed 40",
     "usm train": "--steps 1024",
+    "usm study": "--only reference --seeds 1 --steps 1024 --episodes 2",
+    "usm report": "--policies zero",
     "usm bench": "--help",  # no budget makes it short
 }
 # CI installs, and runs these in a clone of its own.
@@ -46,12 +49,13 @@ def budgeted(line):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with the files that the pages tell a reader to save, and the README."""
+    """A folder with the README, results, and the files that the pages tell a reader to save."""
     for page in PAGES:
         for _, text, before in blocks(page):
             if saved := re.match(r"Save this as `(.+)`", before):
                 (tmp_path / saved[1]).write_text(text, encoding="utf-8")
     (tmp_path / "README.md").write_bytes((ROOT / "README.md").read_bytes())
+    shutil.copytree(ROOT / "results", tmp_path / "results")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
