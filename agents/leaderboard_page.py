@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from agents.terminal import figures, mm
@@ -26,6 +26,9 @@ COLUMNS = (
     "lost",
     "beats the next",
 )
+BRIEF_COLUMNS = ("x, mm", "y, mm", "worst x / y", "variation, N/s", "lost")
+# Whose gains are kept in the README beside better ones: the paper's.
+PAPER = ("sta", "pd")
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes with its 95 % interval, mean of
 the middle half of the episodes, worst episode. Rows are ordered by the sum of the means in x and y.
@@ -42,17 +45,44 @@ SCORES = (
 
 def table(rows: Mapping[str, Any]) -> str:
     """The rows of a suite as Markdown."""
-    lines = [f"| policy | {' | '.join(COLUMNS)} |", "|---|" + "---:|" * len(COLUMNS)]
+    lines = _head(COLUMNS)
     for id, each in rows.items():
-        cells = [id if each["competitor"] else f"{id} (no competitor)"]
         errors = [each[f"max_error_{axis}"] for axis in "xy"]
-        cells += [f"{mm(e['mean'])} [{mm(e['ci95'][0])}, {mm(e['ci95'][1])}]" for e in errors]
-        cells += [mm(e["iqm"]) for e in errors] + [mm(e["worst"]) for e in errors]
+        cells = _means(errors) + [mm(e["iqm"]) for e in errors] + [mm(e["worst"]) for e in errors]
         cells += [figures(each[key]["mean"]) for key in ("thrust_effort", "thrust_variation")]
         beats = each.get("beats_next")
         decision = "" if beats is None else f"{said(beats)} ({beats['probability']:.2f})"
-        lines.append("| " + " | ".join([*cells, str(each["failures"]), decision]) + " |")
+        lines.append(_line(id, each, [*cells, str(each["failures"]), decision]))
     return "\n".join(lines) + "\n"
+
+
+def brief_table(rows: Mapping[str, Any]) -> str:
+    """The README's table: of each law the better gains, and the paper's, in fewer columns."""
+    lines = _head(BRIEF_COLUMNS)
+    laws = set()
+    for id, each in rows.items():
+        law = id.removesuffix("-tuned")
+        if law in laws and id not in PAPER:
+            continue
+        laws.add(law)
+        errors = [each[f"max_error_{axis}"] for axis in "xy"]
+        worst = " / ".join(mm(e["worst"]) for e in errors)
+        variation = figures(each["thrust_variation"]["mean"])
+        lines.append(_line(id, each, [*_means(errors), worst, variation, str(each["failures"])]))
+    return "\n".join(lines) + "\n"
+
+
+def _head(columns: Sequence[str]) -> list[str]:
+    return [f"| policy | {' | '.join(columns)} |", "|---|" + "---:|" * len(columns)]
+
+
+def _line(id: str, row: Mapping[str, Any], cells: Sequence[str]) -> str:
+    name = id if row["competitor"] else f"{id} (no competitor)"
+    return "| " + " | ".join([name, *cells]) + " |"
+
+
+def _means(errors: Sequence[Mapping[str, Any]]) -> list[str]:
+    return [f"{mm(e['mean'])} [{mm(e['ci95'][0])}, {mm(e['ci95'][1])}]" for e in errors]
 
 
 def said(beats: Mapping[str, Any]) -> str:
@@ -63,24 +93,24 @@ def said(beats: Mapping[str, Any]) -> str:
 
 
 def markdown(found: Document) -> str:
-    """The whole leaderboard as Markdown, the main suite's table between the marks of the README."""
+    """The whole leaderboard as Markdown."""
     parts = [f"# Leaderboard of usm-gym {found['version']}\n", LEGEND]
     for name, rows in found["suites"].items():
         episodes = len(next(iter(rows.values()))["per_episode"]["failed"])
         parts.append(f"## {name} ({episodes} episodes)\n")
-        parts.append(readme_block(found) if name == MAIN else table(rows))
+        parts.append(table(rows))
         for id, reason in found["refused"].get(name, {}).items():
             parts.append(f"{id} is refused: {reason}\n")
     return "\n".join(parts)
 
 
 def readme_block(found: Document) -> str:
-    """The main suite's table between its marks, as the README shows it."""
-    return f"{MARKS[0]}\n{table(found['suites'][MAIN])}{MARKS[1]}\n"
+    """The main suite's short table between its marks."""
+    return f"{MARKS[0]}\n{brief_table(found['suites'][MAIN])}{MARKS[1]}\n"
 
 
 def with_table(page: str, found: Document) -> str:
-    """A page with the main suite's table put between its marks.
+    """A page with the main suite's short table put between its marks.
 
     Raises:
         ValueError: If the page lacks the marks.

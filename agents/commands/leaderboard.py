@@ -36,7 +36,7 @@ EXAMPLES = f"""\
 {POLICIES}
 examples:
   usm leaderboard --workers 2                          into results/VERSION
-  usm leaderboard --insert README.md                   and its table between the marks there
+  usm leaderboard --insert README.md                   and a short table between the marks there
   usm leaderboard --policies sta,my_module:MyController --output mine
 """
 
@@ -53,7 +53,11 @@ def add_to(subparsers: Any) -> None:
     add_scoring(parser)
     add = parser.add_argument
     add("--output", metavar="DIR", help="folder (default: results/VERSION)")
-    add("--insert", metavar="FILE", help="page in which to renew the table of the operation suite")
+    add(
+        "--insert",
+        metavar="FILE",
+        help="page in which to renew the short table of the operation suite",
+    )
     parser.set_defaults(run=run)
 
 

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -77,11 +76,10 @@ def test_the_leaderboard_is_the_same_with_one_and_two_workers(
     lines = list(csv.DictReader((folder / "1" / "leaderboard.csv").open()))
     assert len(lines) == 6
     assert float(lines[0]["max_error_x"]) == next(iter(rows.values()))["max_error_x"]["mean"]
-    text = (folder / "1" / "leaderboard.md").read_text()
     page = (folder / "page.md").read_text()
     assert page.startswith("before\n<!-- leaderboard -->\n| policy |")
     assert page.endswith("after\n")
-    assert page[7:-6] in text
+    assert page[7:-6] == leaderboard_page.readme_block(documents[0])
     for figure in ("errors", "profiles", "variation"):
         assert (folder / "1" / f"{figure}.png").stat().st_size > 10_000
     capsys.readouterr()
@@ -148,18 +146,33 @@ def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
     assert "| yes (1.00) |" in table
 
 
-def test_the_table_of_the_readme_is_that_of_the_leaderboard() -> None:
-    made = ROOT / "results" / version("usm-gym") / "leaderboard.md"
+def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper() -> None:
+    from baselines.contender import contender
+    from usm_gym.evaluation import METRICS, Evaluation
+
+    order = ("lqg", "lqg-tuned", "sta-tuned", "pid-tuned", "sta", "pid")
+    rows = board.ranked(
+        [
+            (contender(id), Evaluation({n: np.full(50, k) for n in METRICS}, np.zeros(50, bool)))
+            for k, id in enumerate(order)
+        ]
+    )
+    lines = leaderboard_page.brief_table(rows).splitlines()[2:]
+    assert [line.split(" | ")[0] for line in lines] == [
+        f"| {id}" for id in ("lqg", "sta-tuned", "pid-tuned", "sta")
+    ]
+    assert lines[1].endswith("| 2000 / 2000 | 2.00 | 0 |")
+
+
+def test_readme_and_results_show_the_tables_of_the_leaderboard() -> None:
+    made = ROOT / "results" / version("usm-gym") / "leaderboard.json"
     if not made.exists():
         pytest.skip("there is no leaderboard of this version yet")
-    first, last = map(re.escape, leaderboard_page.MARKS)
-    blocks = [
-        re.findall(f"{first}.*?{last}", path.read_text(encoding="utf-8"), re.DOTALL)
-        for path in (made, ROOT / "README.md")
-    ]
-    assert len(blocks[0]) == 1
-    assert blocks[0] == blocks[1]
-    assert blocks[0][0] in leaderboard_page.markdown(read(made.with_suffix(".json")))
+    found = read(made)
+    assert made.with_suffix(".md").read_text(encoding="utf-8") == leaderboard_page.markdown(found)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert readme.count(leaderboard_page.MARKS[0]) == 1
+    assert leaderboard_page.readme_block(found) in readme
 
 
 def test_shipped_gains_can_be_made() -> None:

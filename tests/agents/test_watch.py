@@ -170,21 +170,57 @@ def test_a_window_shows_the_episode_to_its_end(short):
     assert answer.stderr == ""
 
 
+class Endless:
+    """A film in which something happens at the third frame."""
+
+    size, length, drawn = (64, 48), 10**9, 0
+
+    def __init__(self, happens):
+        self.happens = happens
+
+    def frame(self, index):
+        self.drawn += 1
+        if self.drawn == 3:
+            self.happens()
+        return np.zeros((48, 64, 3), np.uint8)
+
+
 def test_a_closed_window_ends_the_show():
     others = set(_windows)
 
-    class Endless:
-        size, length, drawn = (64, 48), 10**9, 0
+    def close():
+        (window,) = _windows - others
+        pygame.event.post(pygame.Event(pygame.WINDOWCLOSE, window=window))
 
-        def frame(self, index):
-            self.drawn += 1
-            if self.drawn == 3:
-                (window,) = _windows - others
-                pygame.event.post(pygame.Event(pygame.WINDOWCLOSE, window=window))
-            return np.zeros((48, 64, 3), np.uint8)
-
-    film.play(Endless(), 1000.0)
+    film.play(Endless(close), 1000.0)
     assert _windows == others
+
+
+def test_ctrl_c_closes_the_window():
+    others = set(_windows)
+    with pytest.raises(KeyboardInterrupt):
+        film.play(Endless(lambda: signal.raise_signal(signal.SIGINT)), 1000.0)
+    assert _windows == others
+
+
+@pytest.mark.parametrize(
+    ("reader", "status", "said"),
+    [("gone", 1, ""), ("full", 2, "usm: error: [Errno 28] No space left on device\n")],
+)
+def test_a_film_is_whole_whatever_becomes_of_the_scores(
+    reader, status, said, short, output, monkeypatch, capsys
+):
+    if reader == "gone":
+        end, handle = os.pipe()
+        os.close(end)
+    else:
+        handle = os.open("/dev/full", os.O_WRONLY)
+    monkeypatch.setattr(sys, "stdout", os.fdopen(handle, "w"))
+    with pytest.raises(SystemExit) as left:
+        main(["watch", "--suite", str(short), "--speed", "4", "--output", str(output)])
+    assert left.value.code == status
+    assert capsys.readouterr().err == said
+    assert len(probe(output)[1]) == 13
 
 
 def test_a_full_disk_leaves_one_line_and_no_file(output):
