@@ -64,9 +64,10 @@ _EXACT = replace(
 # What an agent owes to one decision or another: `residual-ppo` with a shorter training, less one.
 ABLATIONS: dict[str, Plan] = {
     "reference": _SHORT,
-    "thrusters": replace(_SHORT, action="thrusters"),
     "scale-3": replace(_SHORT, residual_scale=3.0),
     "scale-6": replace(_SHORT, residual_scale=6.0),
+    # To be held against scale-6.
+    "thrusters": replace(_SHORT, action="thrusters", residual_scale=6.0),
     "scale-12": replace(_SHORT, residual_scale=12.0),
     "scale-40": replace(_SHORT, residual_scale=40.0),
     "no-observer-states": replace(_SHORT, omit=OBSERVER_STATES),
