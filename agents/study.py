@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.artifact import agent_contender, make_agent
+from agents.artifact import agent_contender, make_agent, read_agent, write_agent
 from agents.dissection import dissect
 from agents.selection import unseen
 from agents.training import CURVE, TEST_EPISODES, TEST_SEED, Plan, read_plan, train
@@ -234,6 +234,35 @@ def score(
             raise ValueError(f"{key[0]} on {key[1]} is refused: {outcome.reason}")
         found[key] = outcome
     return found
+
+
+def ship(chosen: Sequence[Run], folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Put each agent, as its seed 0, under its own name into a folder.
+
+    Args:
+        chosen: The trainings.
+        folder: Where; each agent has a folder of its own there.
+        provenance: Of the study.
+    """
+    for run in chosen:
+        if run.name not in AGENTS or run.plan.seed != 0:
+            continue
+        agent, network = read_agent(run.folder)
+        given = ("activation", "output", "weights")
+        description = {
+            field.name: getattr(agent, field.name)
+            for field in dataclasses.fields(agent)
+            if field.name not in given
+        }
+        trained = agent.training["provenance"]
+        description["training"] = {
+            **agent.training,
+            "command": run.plan.command(run.name),
+            "provenance": {**trained, "command": provenance["command"]},
+        }
+        tested = {**agent.scores["sampled"], "command": run.plan.test_command(run.name)}
+        description["scores"] = {**agent.scores, "sampled": tested}
+        write_agent(folder / run.name, description, network)
 
 
 def document(

@@ -138,6 +138,11 @@ class Plan:
             words += [f"--{field.name.replace('_', '-')}", str(value)]
         return shlex.join([*words, "--output", output])
 
+    def test_command(self, agent: str) -> str:
+        """The command that scores the agent as the training does in the end."""
+        chosen = f"--mode {self.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"
+        return f"usm evaluate --policies {agent} {chosen}"
+
     def scenario(self, random: np.random.Generator) -> Scenario:
         """Draw a scenario of the training distribution."""
         return sample(self.mode, self.conditions, random)
@@ -323,8 +328,7 @@ class Keeper(BaseCallback):
         scenarios = unseen(plan.mode, FIELD, TEST_SEED, TEST_EPISODES)
         summary = evaluate(ResidualPolicy(self._envs.residual, network), scenarios).summary()
         del summary["per_episode"]
-        chosen = f"--mode {plan.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"
-        command = f"usm evaluate --policies {self._folder.name} {chosen}"
+        command = plan.test_command(self._folder.name)
         self._scores["sampled"] = {"command": command, **summary}
 
     def _diverged(self, steps: int, reason: str) -> DivergedError:

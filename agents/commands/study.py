@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from rich.markdown import Markdown
@@ -45,6 +46,11 @@ def add_to(subparsers: Any) -> None:
     add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
     add_computing(parser)
     add("--output", default="results/study", metavar="DIR", help="default: results/study")
+    add(
+        "--ship",
+        metavar="DIR",
+        help="put each agent, as its seed 0, into a folder of its own there",
+    )
     parser.set_defaults(run=run)
 
 
@@ -79,6 +85,8 @@ def run(arguments: argparse.Namespace) -> None:
             "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
         }
     write_json(folder / "study.json", found)
+    if arguments.ship is not None:
+        study.ship(runs, Path(arguments.ship), found["provenance"])
     text = study_page.markdown(found)
     write_text(folder / "study.md", text)
     study_page.draw_all(found, folder)

@@ -1,11 +1,13 @@
 """The study of agents: what it trains, that it goes on where it stopped, and what its rows say."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from agents import study, training
+from agents.artifact import read_agent
 from agents.dissection import lateness
 from agents.main import main
 from agents.study import PLANS, runs
@@ -26,7 +28,8 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "study"
     command = ["study", "residual", "--only", "residual-ppo,reference", "--seeds", "1"]
     command += ["--steps", "1024", "--episodes", "4", "--output", str(folder)]
-    main(command)
+    shipped = tmp_path / "shipped"
+    main([*command, "--ship", str(shipped)])
     found = json.loads((folder / "study.json").read_text())
     assert list(found["rows"]) == ["residual-ppo", "reference"]
     assert [name for name, each in found["rows"].items() if each["agent"]] == ["residual-ppo"]
@@ -45,6 +48,12 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     main(["evaluate", *chosen, "--output", str(out)])
     again = json.loads(out.read_text())["results"][agent]["per_episode"]["max_error_x"]
     assert scores["field"]["per_episode"]["max_error_x"] == again
+
+    # A shipped agent is the same under its own name.
+    assert [each.name for each in shipped.iterdir()] == ["residual-ppo"]
+    ours, network = read_agent(shipped / "residual-ppo")
+    assert ours.training["command"] == "usm train --steps 1024 --output residual-ppo"
+    assert (network.weights[0] == read_agent(Path(agent))[1].weights[0]).all()
 
     page = tmp_path / "page.html"
     main(["report", str(folder / "study.json"), "--policies", "sta,zero", "--output", str(page)])
