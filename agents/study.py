@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from agents.artifact import agent_contender, make_agent, read_agent, write_agent
 from agents.dissection import dissect
+from agents.plan import TEST_EPISODES, TEST_SEED, Plan, read_plan
 from agents.selection import unseen
-from agents.training import CURVE, TEST_EPISODES, TEST_SEED, Plan, read_plan, train
+from agents.training import CURVE, train
 from baselines.contender import Contender, contender
 from baselines.scoring import Refusal, Task, score_all, shared_nominal
 from usm_gym import parallel

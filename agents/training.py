@@ -8,10 +8,8 @@ What is passed on is the agent (`agents.artifact`).
 from __future__ import annotations
 
 import dataclasses
-import json
 import pickle
 import random
-import shlex
 import shutil
 import time
 from collections.abc import Callable
@@ -21,8 +19,6 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import torch
-from pydantic import TypeAdapter
-from pydantic.dataclasses import dataclass
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -37,25 +33,23 @@ from agents.algorithms import (
     network_of,
 )
 from agents.artifact import write_agent
-from agents.residual import RESIDUAL_SCALE, ActionKind, ResidualPolicy
+from agents.plan import TEST_EPISODES, TEST_SEED, Plan, write_plan
+from agents.residual import ResidualPolicy
 from agents.residual_env import ResidualVectorEnv
 from agents.sb3_vec_env import SB3VecEnv
 from agents.selection import unseen
 from baselines.scoring import shared_nominal
-from usm_gym.conditions import FIELD, Conditions
+from usm_gym.conditions import FIELD
 from usm_gym.evaluation import evaluate
 from usm_gym.files import write_json
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
-from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.seeding import TRAINING, VALIDATION, stream
-from usm_gym.validation import CONFIG, Count, Positive, in_one_line, require
+from usm_gym.validation import require
 
-PLAN, CURVE, STATE, MODEL, REPLAY = "plan.json", "curve.json", "state", "model.zip", "replay"
+CURVE, STATE, MODEL, REPLAY = "curve.json", "state", "model.zip", "replay"
 # Held-out scenarios of the training distribution, the same for all trainings.
 VALIDATION_EPISODES = 32
-# The scenarios on which the agent is scored in the end, as `usm evaluate` samples them.
-TEST_SEED, TEST_EPISODES = 7, 100
 # A training has diverged when so many validations in a row are so many times worse than the best.
 COLLAPSE_COUNT, COLLAPSE_RATIO = 3, 5.0
 # And when a weight is larger than this.
@@ -63,104 +57,11 @@ LARGEST_WEIGHT = 1e6
 
 VALIDATED = ("max_error_x", "max_error_y", "thrust_variation")
 
-# Fields of a plan, and of an agent's description, that are arguments of the residual task.
-TASK = ("residual_scale", "action", "omit", "frames")
-
 Report = Callable[[int, str], None]
 
 
 class DivergedError(ValueError):
     """A training that has diverged."""
-
-
-@dataclass(frozen=True, config=CONFIG)
-class Plan:
-    """What is trained, and how long.
-
-    Attributes:
-        algorithm: "ppo", "sac", "td3" or "tqc".
-        env: Id of a residual task.
-        base: Base policy: an id, or an id with a file of gains.
-        residual_scale: Largest residual, N and N m.
-        action: What the action is: "wrench" or "thrusters".
-        omit: Entries of the observation that the agent is not shown.
-        frames: How many observations it sees at once.
-        conditions: Conditions from which scenarios are sampled.
-        seed: Seed of everything random.
-        steps: Control periods to train on, over all robots.
-        interval: Steps between checkpoints, at each of which the agent is also validated.
-    """
-
-    algorithm: str = "ppo"
-    env: str = "agents:USM-OperationResidual-v0"
-    base: str = "sta"
-    residual_scale: Positive = RESIDUAL_SCALE
-    action: ActionKind = "wrench"
-    omit: tuple[str, ...] = ()
-    frames: Count = 1
-    conditions: Conditions = FIELD
-    seed: int = 0
-    steps: Count = 3_000_000
-    interval: Count = 250_000
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be trained."""
-        require(self.algorithm in CLASSES, "algorithm", self.algorithm, ", ".join(CLASSES))
-        require(self.seed >= 0, "seed", self.seed, "0 or more")
-        known = [id for id in gym.registry if id.endswith("Residual-v0")]
-        require(self.env.removeprefix("agents:") in known, "env", self.env, ", ".join(known))
-        require(":" not in self.base, "base", self.base, "an id, or an id with a file of gains")
-
-    @property
-    def mode(self) -> Mode:
-        """The mode of the task."""
-        mode: Mode = gym.registry[self.env.removeprefix("agents:")].kwargs["mode"]
-        return mode
-
-    @property
-    def task(self) -> dict[str, Any]:
-        """What the residual task is, but for its base."""
-        return {name: getattr(self, name) for name in TASK}
-
-    def command(self, output: str) -> str:
-        """The command that does it."""
-        words = ["usm", "train"]
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if value == field.default:
-                continue
-            if isinstance(value, tuple):
-                value = ",".join(value)
-            if isinstance(value, Conditions):
-                changed = _PLAN.dump_python(self, mode="json")["conditions"].items()
-                usual = dataclasses.asdict(FIELD)
-                value = json.dumps({k: v for k, v in changed if v != _listed(usual[k])})
-            words += [f"--{field.name.replace('_', '-')}", str(value)]
-        return shlex.join([*words, "--output", output])
-
-    def test_command(self, agent: str) -> str:
-        """The command that scores the agent as the training does in the end."""
-        chosen = f"--mode {self.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"
-        return f"usm evaluate --policies {agent} {chosen}"
-
-    def scenario(self, random: np.random.Generator) -> Scenario:
-        """Draw a scenario of the training distribution."""
-        return sample(self.mode, self.conditions, random)
-
-
-_PLAN = TypeAdapter(Plan)
-
-
-def read_plan(folder: Path) -> Plan:
-    """The plan of a training that was begun.
-
-    Raises:
-        ValueError: If the folder holds none.
-    """
-    try:
-        return _PLAN.validate_json((folder / PLAN).read_bytes())
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{folder} holds no training: {in_one_line(error)}") from error
 
 
 def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
@@ -179,8 +80,7 @@ def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
     """
     # With one thread, sums are added in the same order on every machine.
     torch.set_num_threads(1)
-    folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / PLAN, _PLAN.dump_python(plan, mode="json"))
+    write_plan(plan, folder)
     envs = gym.make_vec(
         plan.env,
         num_envs=ROBOTS[plan.algorithm],
@@ -363,7 +263,7 @@ class Keeper(BaseCallback):
 
     def _write_agent(self) -> None:
         plan, (point, network) = self._plan, self._best
-        recorded = _PLAN.dump_python(plan, mode="json")
+        recorded = plan.record()
         residual = self._envs.residual
         gains = getattr(residual.base, "gains", None)
         description = {
@@ -399,10 +299,6 @@ def latest_checkpoint(folder: Path) -> Path | None:
     """The last complete checkpoint, if there is one."""
     found = checkpoints(folder)
     return found[-1] if found else None
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
 
 
 def _error(point: dict[str, Any]) -> float:

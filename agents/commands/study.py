@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> None:
         "nothing, until Stable-Baselines3 is installed (the extra `agents`)",
     )
     from agents import study, study_page
-    from agents.training import TEST_SEED
+    from agents.plan import TEST_SEED
 
     for name, least in (("seeds", 1), ("episodes", 2), ("steps", 1)):
         value = getattr(arguments, name)

@@ -65,7 +65,8 @@ def run(arguments: argparse.Namespace) -> None:
         arguments.output,
         "nothing, until Stable-Baselines3 is installed (the extra `agents`)",
     )
-    from agents.training import PLAN, Plan, read_plan, train
+    from agents.plan import PLAN, Plan, read_plan
+    from agents.training import train
 
     names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
     given = {name: getattr(arguments, name) for name in names}

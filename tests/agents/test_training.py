@@ -14,8 +14,9 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import usm_gym
 from agents import algorithms, training
 from agents.artifact import make_agent
+from agents.plan import Plan
 from agents.sb3_vec_env import SB3VecEnv
-from agents.training import DivergedError, Plan, train
+from agents.training import DivergedError, train
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
 
@@ -25,10 +26,11 @@ KILLER = """
 import os, random, signal, sys, time
 from pathlib import Path
 from agents import training
+from agents.plan import Plan
 
 training.ROBOTS = {"ppo": 16}
 training.VALIDATION_EPISODES = training.TEST_EPISODES = 2
-plan, folder = training.Plan(steps=4096, interval=1024), Path(sys.argv[1])
+plan, folder = Plan(steps=4096, interval=1024), Path(sys.argv[1])
 chance, steps, kills = random.Random(0), 0, 0
 while True:
     child = os.fork()
