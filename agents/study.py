@@ -78,8 +78,8 @@ ABLATIONS: dict[str, Plan] = {
     "no-randomisation": replace(_SHORT, conditions=_EXACT),
 }
 PLANS = AGENTS | ABLATIONS
-# Seeds of each training at most, so that all of it takes two hours on two cores.
-SEEDS = dict.fromkeys(PLANS, 1) | {"residual-ppo": 3}
+# Seeds of each training at most.
+SEEDS = dict.fromkeys(AGENTS, 5) | dict.fromkeys(ABLATIONS, 3)
 
 # Classical policies beside which the agents stand.
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
