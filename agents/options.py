@@ -22,6 +22,22 @@ from usm_gym.validation import require
 CONNECTION_TIME = 10.0
 
 
+def check_installed(what: str, extra: str, *modules: str) -> None:
+    """Refuse what needs a module that is not installed.
+
+    Args:
+        what: What needs it.
+        extra: The extra that it comes with.
+        modules: Names under which the modules are imported.
+
+    Raises:
+        ValueError: If one is not there.
+    """
+    for module in modules:
+        if find_spec(module) is None:
+            raise ValueError(f"{what} needs {module}: pip install 'usm-gym[{extra}]'")
+
+
 def add_computing(parser: argparse.ArgumentParser) -> None:
     """Add the options that say on what to compute."""
     add = parser.add_argument
@@ -37,12 +53,7 @@ def computing(arguments: argparse.Namespace) -> Iterator[int]:
     if arguments.cluster is None:
         yield workers or 1
         return
-    require(
-        find_spec("ray") is not None,
-        "--cluster",
-        arguments.cluster,
-        "nothing, until Ray is installed (the extra `cluster`)",
-    )
+    check_installed("--cluster", "cluster", "ray")
     import ray
     from ray.util.joblib import register_ray
 
@@ -99,12 +110,7 @@ def output_folder(name: str) -> Path:
         ValueError: If figures cannot be drawn.
         OSError: If nothing can be written there.
     """
-    require(
-        find_spec("matplotlib") is not None,
-        "--output",
-        name,
-        "nothing, until matplotlib is installed (the extra `render`)",
-    )
+    check_installed("drawing figures", "render", "matplotlib")
     folder = Path(name)
     folder.mkdir(parents=True, exist_ok=True)
     check_writable(folder / "table")

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from rich.progress import Progress, TaskID
 
-from agents.options import add_computing, computing, count
+from agents.options import add_computing, check_installed, computing, count
 from agents.selection import POLICIES, chosen_contenders
 from agents.terminal import output_console, progress_bar
 from usm_gym.files import check_writable, write_text
@@ -55,8 +54,7 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Replay, write the page."""
-    if find_spec("jinja2") is None:
-        raise ValueError("usm report needs jinja2: pip install 'usm-gym[report]'")
+    check_installed("usm report", "report", "jinja2")
     # These need the extra.
     from agents.report.chapters import Choice, chapter, read
     from agents.report.page import html

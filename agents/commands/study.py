@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from rich.markdown import Markdown
 
-from agents.options import add_computing, computing, output_folder
+from agents.options import add_computing, check_installed, computing, output_folder
 from agents.terminal import output_console, progress_bar
 from usm_gym.files import write_json, write_text
 from usm_gym.provenance import provenance
@@ -56,12 +55,7 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Train, score, write the folder, print the tables."""
-    require(
-        find_spec("sb3_contrib") is not None,
-        "usm study",
-        arguments.subject,
-        "nothing, until Stable-Baselines3 is installed (the extra `agents`)",
-    )
+    check_installed("usm study", "agents", "sb3_contrib")
     from agents import study, study_page
     from agents.plan import TEST_SEED
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from agents.options import parse_conditions
+from agents.options import check_installed, parse_conditions
 from agents.terminal import mm, output_console, progress_bar
 from usm_gym.validation import require
 
@@ -59,12 +58,7 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Train, with a progress bar, and say what came of it."""
     folder = Path(arguments.output)
-    require(
-        find_spec("sb3_contrib") is not None,
-        "usm train",
-        arguments.output,
-        "nothing, until Stable-Baselines3 is installed (the extra `agents`)",
-    )
+    check_installed("usm train", "agents", "sb3_contrib")
     from agents.plan import PLAN, Plan, read_plan
     from agents.training import train
 

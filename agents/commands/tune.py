@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from agents.options import add_computing, computing, count, parse_conditions
+from agents.options import add_computing, check_installed, computing, count, parse_conditions
 from agents.terminal import figures, output_console, progress_bar
 from baselines.gains import Budget
 from usm_gym.conditions import FIELD
 from usm_gym.files import check_writable, write_json
 from usm_gym.provenance import provenance
 from usm_gym.scenario import MODES
-from usm_gym.validation import require
 
 DESCRIPTION = """\
 Look for the gains of a policy with the smallest mean of max_error_x + max_error_y, in mm, plus a
@@ -56,12 +54,7 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Tune, write the gains, print what they are worth."""
-    require(
-        find_spec("optuna") is not None,
-        "usm tune",
-        arguments.policy,
-        "nothing, until Optuna is installed (the extra `tune`)",
-    )
+    check_installed("usm tune", "tune", "optuna")
     from baselines.tuning import VARIATION_WEIGHT, Problem, tune
 
     output = Path(arguments.output or f"{arguments.policy}.json")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from agents.options import check_installed
 from agents.selection import (
     POLICIES,
     add_policies,
@@ -38,7 +38,6 @@ examples:
   usm watch --suite torpedo --scenario 7        another episode
   usm watch --seed 3 --speed 4                  a sampled one, four times as fast
 """
-NEEDED = {"pygame": "pygame-ce", "matplotlib": "matplotlib", "imageio_ffmpeg": "imageio-ffmpeg"}
 
 
 def add_to(subparsers: Any) -> None:
@@ -59,9 +58,7 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Simulate, then write or show, then print the scores."""
-    for module, package in NEEDED.items():
-        if find_spec(module) is None:
-            raise ValueError(f"usm watch needs {package}: pip install 'usm-gym[render]'")
+    check_installed("usm watch", "render", "pygame", "matplotlib", "imageio_ffmpeg")
     # These need the extra.
     from agents import film
     from usm_gym.window import has_display

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import usm_gym
-from agents.commands import report
 from agents.main import main
 from agents.report import chapters, page, plots
 from agents.report.replay import packed
@@ -225,7 +224,7 @@ def test_wrong_options_get_one_line(folder, capsys, monkeypatch):
         status, said = command(["report", result, *options], capsys)
         assert (status, said.count("\n")) == (2, 1)
         assert message in said
-    monkeypatch.setattr(report, "find_spec", lambda name: None)
+    monkeypatch.setattr("agents.options.find_spec", lambda name: None)
     _, said = command(["report", result, "--output", folder / "no.html"], capsys)
     assert "pip install 'usm-gym[report]'" in said
     assert not (folder / "no.html").exists()
