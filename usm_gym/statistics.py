@@ -63,6 +63,25 @@ def mean_interval(values: Array) -> tuple[float, Interval]:
     return float(np.mean(values)), interval(np.mean, values)
 
 
+def ratio_interval(
+    first: ArrayLike, second: ArrayLike, strata: Sequence[str] | None = None
+) -> Interval:
+    """Interval of the mean of a first policy over that of a second, on the same episodes.
+
+    Args:
+        first: A score of the first policy in each episode, (episodes,).
+        second: The same of the second policy, in the same order.
+        strata: To which stratum each episode belongs; without it, all are one.
+    """
+    one, other = np.asarray(first, np.float64), np.asarray(second, np.float64)
+
+    def ratio(drawn: Array, axis: int) -> Any:
+        index = drawn.astype(np.intp)
+        return one[index].mean(axis=axis) / other[index].mean(axis=axis)
+
+    return interval(ratio, np.arange(one.size), strata)
+
+
 def interquartile_mean(values: Any, axis: int = -1) -> Any:
     """Mean of the middle half of the episodes, which no outlier moves."""
     from scipy.stats import trim_mean

@@ -56,32 +56,33 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Train, score, write the folder, print the tables."""
     check_installed("usm study", "agents", "sb3_contrib")
-    from agents import study, study_page
     from agents.plan import TEST_SEED
+    from agents.study import figures, page, plans, scores, trainings
+    from agents.study.dissection import dissected
 
     for name, least in (("seeds", 1), ("episodes", 2), ("steps", 1)):
         value = getattr(arguments, name)
         require(value is None or value >= least, f"--{name}", value, f"{least} or more")
-    names = list(study.PLANS) if arguments.only is None else arguments.only.split(",")
+    names = list(plans.PLANS) if arguments.only is None else arguments.only.split(",")
     folder = output_folder(arguments.output)
-    runs = study.runs(names, arguments.seeds, folder, arguments.steps)
+    runs = trainings.runs(names, arguments.seeds, folder, arguments.steps)
     with computing(arguments) as workers, progress_bar() as bar:
         line = bar.add_task("trainings", total=len(runs))
-        study.train_all(runs, workers, lambda run: bar.advance(line))
-        tasks = study.tasks(runs, study.RIVALS, arguments.episodes)
+        trainings.train_all(runs, workers, lambda run: bar.advance(line))
+        tasks = scores.tasks(runs, plans.RIVALS, arguments.episodes)
         line = bar.add_task("episodes", total=sum(len(task.scenarios) for task in tasks.values()))
         cache = folder / "cache"
-        scores = study.score(tasks, workers, cache, lambda episodes: bar.advance(line, episodes))
+        outcomes = scores.score(tasks, workers, cache, lambda count: bar.advance(line, count))
         found = {
-            **study.document(runs, scores, study.RIVALS),
+            **scores.document(runs, outcomes, plans.RIVALS),
             "episodes": arguments.episodes,
-            "dissected": study.dissected(runs),
+            "dissected": dissected(runs),
             "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
         }
     write_json(folder / "study.json", found)
     if arguments.ship is not None:
-        study.ship(runs, Path(arguments.ship), found["provenance"])
-    text = study_page.markdown(found)
+        trainings.ship(runs, Path(arguments.ship), found["provenance"])
+    text = page.markdown(found)
     write_text(folder / "study.md", text)
-    study_page.draw_all(found, folder)
+    figures.draw_all(found, folder)
     output_console().print(Markdown(text))

@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents import study, training
+from agents import training
 from agents.artifact import read_agent
-from agents.dissection import lateness
 from agents.main import main
-from agents.study import PLANS, runs
+from agents.study import dissection, page, plans, scores, trainings
+from agents.study.dissection import lateness
+from agents.study.plans import PLANS, SEEDS, TRANSFER
+from agents.study.scores import steps_to
+from agents.study.trainings import runs
 from usm_gym.conditions import FIELD
 
 
@@ -19,9 +22,10 @@ def small(monkeypatch):
     monkeypatch.setattr(training, "ROBOTS", {"ppo": 16})
     monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
     monkeypatch.setattr(training, "TEST_EPISODES", 2)
-    monkeypatch.setattr(study, "RIVALS", ("sta", "zero"))
-    monkeypatch.setattr(study, "TRANSFER", {"still": study.TRANSFER["still"]})
-    monkeypatch.setattr(study, "DISSECTED_EPISODES", 1)
+    monkeypatch.setattr(plans, "RIVALS", ("sta", "zero"))
+    for module in (scores, page):
+        monkeypatch.setattr(module, "TRANSFER", {"still": TRANSFER["still"]})
+    monkeypatch.setattr(dissection, "EPISODES", 1)
 
 
 def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
@@ -33,13 +37,20 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     found = json.loads((folder / "study.json").read_text())
     assert list(found["rows"]) == ["residual-ppo", "reference"]
     assert [name for name, each in found["rows"].items() if each["agent"]] == ["residual-ppo"]
-    scores = found["rows"]["residual-ppo"]["scores"]
-    assert set(scores) == {"field", "still"}
+    ours = found["rows"]["residual-ppo"]["scores"]
+    assert set(ours) == {"field", "still"}
     assert set(found["rows"]["reference"]["scores"]) == {"field"}
     for name in ("study.md", "curves.png", "front.png", "spectra.png"):
         assert (folder / name).stat().st_size > 0
     dissected = found["dissected"]["residual-ppo"]["x"]["deviation"]
     assert dissected["base alone"] > dissected["needed"] > 0.0
+
+    against = found["against"]["residual-ppo"]
+    assert list(against) == ["sta", "zero"]
+    theirs = found["rivals"]["sta"]["scores"]["field"]
+    mean = ours["field"]["max_error_x"]["mean"] / theirs["max_error_x"]["mean"]
+    (low, high), *_ = against["sta"]["ratio_ci95"]
+    assert low <= against["sta"]["ratio"][0] == mean <= high
 
     # The same scores as `usm evaluate` gives.
     out = tmp_path / "scores.json"
@@ -47,12 +58,12 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     chosen = ["--policies", agent, "--seed", "7", "--episodes", "4"]
     main(["evaluate", *chosen, "--output", str(out)])
     again = json.loads(out.read_text())["results"][agent]["per_episode"]["max_error_x"]
-    assert scores["field"]["per_episode"]["max_error_x"] == again
+    assert ours["field"]["per_episode"]["max_error_x"] == again
 
     # A shipped agent is the same under its own name.
     assert [each.name for each in shipped.iterdir()] == ["residual-ppo"]
-    ours, network = read_agent(shipped / "residual-ppo")
-    assert ours.training["command"] == "usm train --steps 1024 --output residual-ppo"
+    agent_file, network = read_agent(shipped / "residual-ppo")
+    assert agent_file.training["command"] == "usm train --steps 1024 --output residual-ppo"
     assert (network.weights[0] == read_agent(Path(agent))[1].weights[0]).all()
 
     page = tmp_path / "page.html"
@@ -62,7 +73,7 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     assert "residual-ppo" in text
 
     # What is done is not done again; another training in its place is refused.
-    monkeypatch.setattr(study, "train_one", None)
+    monkeypatch.setattr(trainings, "train_one", None)
     main(command)
     capsys.readouterr()
     with pytest.raises(SystemExit, match="2"):
@@ -79,8 +90,8 @@ def test_every_seed_has_its_own_training_and_early_seeds_come_first(tmp_path):
     assert len({run.folder for run in found}) == len(found)
     for name in PLANS:
         seeds = [run.plan.seed for run in found if run.name == name]
-        assert seeds == list(range(study.SEEDS[name]))
-    assert study.SEEDS["residual-ppo"] > 1
+        assert seeds == list(range(SEEDS[name]))
+    assert SEEDS["residual-ppo"] > 1
     with pytest.raises(ValueError, match="--only is 'nobody'"):
         runs(["nobody"], 1, tmp_path)
 
@@ -97,3 +108,16 @@ def test_lateness_is_found():
     needed = np.random.default_rng(0).normal(size=(400, 3))
     assert lateness(np.roll(needed, 4, axis=0), needed) == 4
     assert lateness(np.roll(needed, -3, axis=0), needed) == -3
+
+
+def test_steps_to_an_error_are_read_off_the_mean_of_the_curves():
+    def curve(*errors):
+        return [
+            {"steps": 100 * k, "max_error_x": error, "max_error_y": 0.0}
+            for k, error in enumerate(errors)
+        ]
+
+    curves = {"0": curve(5.0, 3.0, 1.0), "1": curve(5.0, 1.0, 1.0)}
+    assert steps_to(curves, 5.0) == 0
+    assert steps_to(curves, 1.9) == 200
+    assert steps_to(curves, 0.5) is None

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from usm_gym import statistics
-from usm_gym.statistics import compare, improvement, interquartile_mean, interval
+from usm_gym.statistics import (
+    compare,
+    improvement,
+    interquartile_mean,
+    interval,
+    ratio_interval,
+)
 
 
 def test_an_interval_covers_the_truth_about_as_often_as_it_says() -> None:
@@ -25,6 +31,15 @@ def test_intervals_have_no_randomness() -> None:
     values = np.random.default_rng(1).random(50)
     assert interval(np.mean, values) == interval(np.mean, values)
     assert interval(np.mean, [2.0]) == (2.0, 2.0)
+
+
+def test_a_ratio_is_of_pairs_and_its_interval_covers_the_truth() -> None:
+    rng = np.random.default_rng(2)
+    episodes = rng.exponential(size=60)
+    assert ratio_interval(0.25 * episodes, episodes) == (0.25, 0.25)
+    draws = [(rng.exponential(size=60), rng.exponential(2.0, size=60)) for _ in range(100)]
+    limits = [ratio_interval(ours, theirs) for ours, theirs in draws]
+    assert 88 <= sum(low <= 0.5 <= high for low, high in limits) <= 99
 
 
 def test_the_interquartile_mean_is_that_of_the_middle_half() -> None:

@@ -13,10 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.artifact import make_agent
+from agents.plan import TEST_SEED
 from agents.residual import Memory, ResidualPolicy
+from agents.selection import unseen
+from agents.study.plans import AGENTS
+from agents.study.trainings import Run
 from baselines.estimator import Estimator
 from baselines.oracle import Oracle
 from baselines.policy import Policy
+from baselines.scoring import shared_nominal
+from usm_gym.conditions import FIELD
 from usm_gym.evaluation import rollout
 from usm_gym.nominal import Nominal
 from usm_gym.robot import Robot
@@ -26,6 +33,8 @@ Array = NDArray[np.float64]
 
 # Longest shift in time that is tried between two forces, control periods.
 LONGEST_SHIFT = 10
+# Episodes of each agent.
+EPISODES = 16
 # Samples of a segment of Welch's method: 0.1 Hz apart at 50 Hz.
 SEGMENT = 500
 
@@ -74,11 +83,10 @@ def dissect(
 
     Returns:
         Of each axis: standard deviation of each force, N, also of the base's when it acts alone;
-        the share of base - needed that the
-        residual takes back, and the share of needed that it adds, by least squares, with the share
-        of the residual's variance which the two explain; by how many seconds the whole force is
-        late behind the needed one, by the largest correlation; and power spectral densities,
-        N^2/Hz, over the frequencies, Hz.
+        the share of base - needed that the residual takes back, and the share of needed that it
+        adds, by least squares, with the share of the residual's variance which the two explain; by
+        how many seconds the whole force is late behind the needed one, by the largest correlation;
+        and power spectral densities, N^2/Hz, over the frequencies, Hz.
     """
     limit = scenarios[0].conditions.thruster_limit
     settled = round(scenarios[0].settle_time / nominal.control_period)
@@ -145,3 +153,15 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
 
     frequency, density = signal.welch(force, 1.0 / period, nperseg=SEGMENT, axis=0)
     return frequency, density
+
+
+def dissected(chosen: Sequence[Run]) -> dict[str, Any]:
+    """What each agent, as its seed 0, does to its base; see `dissect`."""
+    found = {}
+    for run in chosen:
+        if run.name in AGENTS and run.plan.seed == 0:
+            episodes = unseen(run.plan.mode, FIELD, TEST_SEED, EPISODES)
+            nominal = shared_nominal(Robot(), episodes)
+            policy = make_agent(nominal, str(run.folder))
+            found[run.name] = dissect(policy, nominal, episodes)
+    return found

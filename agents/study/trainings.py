@@ -1,0 +1,121 @@
+"""The trainings of a study, and the agents that are shipped of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from agents.artifact import read_agent, write_agent
+from agents.plan import Plan, read_plan
+from agents.study.plans import AGENTS, PLANS, SEEDS
+from agents.training import CURVE, train
+from usm_gym import parallel
+from usm_gym.validation import require
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One training of the study.
+
+    Attributes:
+        name: Name of the agent or ablation.
+        plan: What is trained.
+        folder: Where.
+    """
+
+    name: str
+    plan: Plan
+    folder: Path
+
+    @property
+    def done(self) -> bool:
+        """Whether the training has come to its end.
+
+        Raises:
+            ValueError: If the folder holds a training of another plan.
+        """
+        if not (self.folder / CURVE).exists():
+            return False
+        plan = read_plan(self.folder)
+        name = self.folder.name
+        had, has = plan.command(name), self.plan.command(name)
+        require(had == has, f"the training in {self.folder}", had, has)
+        return bool(self.curve[-1]["steps"] >= plan.steps)
+
+    @property
+    def curve(self) -> list[dict[str, Any]]:
+        """The learning curve, as far as it goes."""
+        curve: list[dict[str, Any]] = json.loads((self.folder / CURVE).read_text())
+        return curve
+
+
+def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = None) -> list[Run]:
+    """The trainings of the study, seed by seed, so that an early stop leaves some of each.
+
+    Args:
+        names: Names of agents and ablations.
+        seeds: How many seeds, from 0 on, and no more than `SEEDS` of each.
+        folder: Folder of the study.
+        steps: How many steps each is trained; without it, as its plan says.
+
+    Raises:
+        ValueError: If a name is unknown.
+    """
+    found = []
+    for seed in range(seeds):
+        for name in names:
+            require(name in PLANS, "--only", name, ", ".join(PLANS))
+            if seed >= SEEDS[name]:
+                continue
+            plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
+            found.append(Run(name, plan, folder / "runs" / f"{name}-{seed}"))
+    return found
+
+
+def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], object]) -> None:
+    """Train what is not trained yet; an interrupted training goes on where it was."""
+    waiting = []
+    for run in chosen:
+        if run.done:
+            report(run)
+        else:
+            waiting.append(run)
+    for index, _ in parallel.results(train_one, [(run,) for run in waiting], workers):
+        report(waiting[index])
+
+
+def train_one(run: Run) -> None:
+    """Carry out one training."""
+    train(run.plan, run.folder, lambda steps, line: None)
+
+
+def ship(chosen: Sequence[Run], folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Put each agent, as its seed 0, under its own name into a folder.
+
+    Args:
+        chosen: The trainings.
+        folder: Where; each agent has a folder of its own there.
+        provenance: Of the study.
+    """
+    for run in chosen:
+        if run.name not in AGENTS or run.plan.seed != 0:
+            continue
+        agent, network = read_agent(run.folder)
+        given = ("activation", "output", "weights")
+        description = {
+            field.name: getattr(agent, field.name)
+            for field in dataclasses.fields(agent)
+            if field.name not in given
+        }
+        trained = agent.training["provenance"]
+        description["training"] = {
+            **agent.training,
+            "command": run.plan.command(run.name),
+            "provenance": {**trained, "command": provenance["command"]},
+        }
+        tested = {**agent.scores["sampled"], "command": run.plan.test_command(run.name)}
+        description["scores"] = {**agent.scores, "sampled": tested}
+        write_agent(folder / run.name, description, network)
