@@ -8,22 +8,40 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.spaces import Box
-from sb3_contrib import TQC
+from sb3_contrib import TQC, RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
-from agents.network import Activation, Network
+from agents.network import Network, Recurrence
 
 # Rewards are multiplied by this in training, so that returns are of order one.
 REWARD_SCALE = 0.1
-CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3, "tqc": TQC}
+CLASSES: dict[str, type[BaseAlgorithm]] = {
+    "ppo": PPO,
+    "recurrent-ppo": RecurrentPPO,
+    "sac": SAC,
+    "td3": TD3,
+    "tqc": TQC,
+}
+ON_POLICY = ("ppo", "recurrent-ppo")
 # Robots side by side: for PPO a rollout is many robots by few steps, so that little time is spent
 # between steps; the others learn after each step of all.
-ROBOTS = {"ppo": 256, "sac": 32, "td3": 32, "tqc": 32}
+ROBOTS = {"ppo": 256, "recurrent-ppo": 256, "sac": 32, "td3": 32, "tqc": 32}
 
+_PPO: dict[str, Any] = {
+    "hidden": (128, 128),
+    "n_steps": 64,
+    "batch_size": 1024,
+    "n_epochs": 6,
+    "learning_rate": 5e-4,
+    "gamma": 0.97,
+    "gae_lambda": 0.95,
+    "target_kl": 0.03,
+    "log_std_init": -1.5,  # small exploration around the base
+}
 _OFF_POLICY: dict[str, Any] = {
     "hidden": (64, 64),
     "learning_rate": 5e-4,
@@ -34,20 +52,12 @@ _OFF_POLICY: dict[str, Any] = {
     "train_freq": 1,
     "gradient_steps": 2,
 }
-# Widths of the hidden layers, and arguments that are not defaults. The rate of PPO falls
-# linearly to a tenth over the training; TD3 explores with independent noise of that deviation.
+# Widths of the hidden layers, units of the memory before them, and arguments that are not defaults.
+# The rate of PPO falls linearly to a tenth over the training; TD3 explores with independent noise
+# of that deviation.
 SETTINGS: dict[str, dict[str, Any]] = {
-    "ppo": {
-        "hidden": (128, 128),
-        "n_steps": 64,
-        "batch_size": 1024,
-        "n_epochs": 6,
-        "learning_rate": 5e-4,
-        "gamma": 0.97,
-        "gae_lambda": 0.95,
-        "target_kl": 0.03,
-        "log_std_init": -1.5,  # small exploration around the base
-    },
+    "ppo": _PPO,
+    "recurrent-ppo": _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_epochs": 4},
     "sac": _OFF_POLICY | {"ent_coef": "auto_0.01"},
     "td3": _OFF_POLICY | {"noise": 0.2},
     "tqc": _OFF_POLICY | {"ent_coef": "auto_0.01"},
@@ -69,7 +79,10 @@ def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
     """A new model, whose deterministic actions are nearly zero, so that the base acts as it is."""
     arguments: dict[str, Any] = dict(SETTINGS[algorithm])
     policy: dict[str, Any] = {"net_arch": list(arguments.pop("hidden"))}
-    if algorithm == "ppo":
+    kind = "MlpPolicy"
+    if algorithm == "recurrent-ppo":
+        kind, policy["lstm_hidden_size"] = "MlpLstmPolicy", arguments.pop("units")
+    if algorithm in ON_POLICY:
         policy["activation_fn"] = nn.Tanh
         policy["log_std_init"] = arguments.pop("log_std_init")
         arguments["learning_rate"] = Falling(arguments["learning_rate"])
@@ -78,7 +91,7 @@ def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
         zero = np.zeros(env.action_space.shape)
         noise = NormalActionNoise(zero, zero + arguments.pop("noise"))
         arguments["action_noise"] = VectorizedActionNoise(noise, env.num_envs)
-    model = CLASSES[algorithm]("MlpPolicy", env, policy_kwargs=policy, device="cpu", **arguments)
+    model = CLASSES[algorithm](kind, env, policy_kwargs=policy, device="cpu", **arguments)
     with torch.no_grad():
         last = _layers(algorithm, model)[-1]
         last.weight.mul_(0.01)
@@ -89,18 +102,24 @@ def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
 def network_of(algorithm: str, model: Any) -> Network:
     """The part of a model that acts, deterministically, without torch."""
     layers = _layers(algorithm, model)
-    activation: Activation = "tanh" if algorithm == "ppo" else "relu"
+    on_policy = algorithm in ON_POLICY
     return Network(
         tuple(layer.weight.detach().numpy().T.copy() for layer in layers),
         tuple(layer.bias.detach().numpy().copy() for layer in layers),
-        activation,
-        "clip" if algorithm == "ppo" else "tanh",
+        "tanh" if on_policy else "relu",
+        "clip" if on_policy else "tanh",
+        _recurrence(model.policy.lstm_actor) if algorithm == "recurrent-ppo" else None,
     )
+
+
+def _recurrence(lstm: nn.LSTM) -> Recurrence:
+    given, kept, one, other = (each.detach().numpy() for each in lstm.parameters())
+    return Recurrence(given.T.copy(), kept.T.copy(), one + other)
 
 
 def _layers(algorithm: str, model: Any) -> list[nn.Linear]:
     policy = model.policy
-    if algorithm == "ppo":
+    if algorithm in ON_POLICY:
         modules = [*policy.mlp_extractor.policy_net, policy.action_net]
     elif algorithm == "td3":
         modules = [*policy.actor.mu]

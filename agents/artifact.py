@@ -19,7 +19,7 @@ from pydantic.dataclasses import dataclass
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from agents.network import Activation, Network, Output
+from agents.network import Activation, Network, Output, Recurrence
 from agents.residual import ActionKind, Residual, ResidualPolicy
 from baselines.contender import Contender, fingerprint
 from baselines.registry import make, register
@@ -29,6 +29,7 @@ from usm_gym.scenario import Mode
 from usm_gym.validation import CONFIG, Count, Number, Positive, in_one_line, require
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
+RECURRENCE = "recurrence_"  # begins the names of its arrays
 PRETRAINED = Path(__file__).with_name("pretrained")
 
 
@@ -85,6 +86,8 @@ def write_agent(folder: Path, description: Mapping[str, Any], network: Network) 
     arrays: dict[str, NDArray[np.float32]] = {}
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[f"weight_{k}"], arrays[f"bias_{k}"] = weight, bias
+    if network.recurrence is not None:
+        arrays |= {RECURRENCE + name: each for name, each in network.recurrence._asdict().items()}
     data = save(arrays)
     agent = Agent(
         **description,
@@ -113,14 +116,20 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
     require(found == agent.weights, f"SHA-256 of {folder / WEIGHTS}", found, agent.weights)
     try:
         arrays = load(data)
+        parts = {
+            name.removeprefix(RECURRENCE): arrays.pop(name)
+            for name in list(arrays)
+            if name.startswith(RECURRENCE)
+        }
         count = len(arrays) // 2
         return agent, Network(
             tuple(arrays[f"weight_{k}"] for k in range(count)),
             tuple(arrays[f"bias_{k}"] for k in range(count)),
             agent.activation,
             agent.output,
+            Recurrence(**parts) if parts else None,
         )
-    except (SafetensorError, KeyError, ValueError) as error:
+    except (SafetensorError, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
 
 

@@ -32,7 +32,7 @@ class Plan:
     """What is trained, and how long.
 
     Attributes:
-        algorithm: "ppo", "sac", "td3" or "tqc".
+        algorithm: "ppo", "recurrent-ppo", "sac", "td3" or "tqc".
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, N and N m.

@@ -188,6 +188,8 @@ class Keeper(BaseCallback):
         if (checkpoint / REPLAY).exists():
             model.load_replay_buffer(checkpoint / REPLAY, truncate_last_traj=False)  # type: ignore[attr-defined]
         state = pickle.loads((checkpoint / STATE).read_bytes())
+        if state["memory"] is not None:
+            model._last_lstm_states = state["memory"]  # type: ignore[attr-defined]
         self._face.restore(state["envs"])
         self.curve, self._best = state["curve"], state["best"]
         self._seconds = self.curve[-1]["seconds"]
@@ -246,6 +248,7 @@ class Keeper(BaseCallback):
                 self.model.save_replay_buffer(file)
         state = {
             "envs": self._face.snapshot(),
+            "memory": getattr(self.model, "_last_lstm_states", None),
             "curve": self.curve,
             "best": self._best,
             "python": random.getstate(),

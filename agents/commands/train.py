@@ -25,7 +25,7 @@ examples:
 """
 # Options that make the plan, by the names of its fields.
 OPTIONS = (
-    ("algorithm", str, "A", "ppo, sac, td3 or tqc (default: ppo)"),
+    ("algorithm", str, "A", "ppo, recurrent-ppo, sac, td3 or tqc (default: ppo)"),
     ("env", str, "ID", "residual task (default: agents:USM-OperationResidual-v0)"),
     ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
     ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),

@@ -9,12 +9,11 @@ import agents  # noqa: F401 (registers them)
 import baselines
 import usm_gym
 from agents.artifact import DESCRIPTION, PRETRAINED, read_agent
+from agents.selection import unseen
 from baselines.leaderboard import total
 from usm_gym.conditions import Conditions
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
-from usm_gym.scenario import sample
-from usm_gym.seeding import EVALUATION, stream
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
@@ -23,8 +22,7 @@ SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 def test_a_shipped_agent_beats_its_base_as_it_says(folder):
     assert folder.name in baselines.ids()
     agent, _ = read_agent(folder)
-    conditions = Conditions(**agent.conditions)
-    scenarios = [sample(agent.mode, conditions, stream(11, EVALUATION, i)) for i in range(16)]
+    scenarios = unseen(agent.mode, Conditions(**agent.conditions), seed=11, episodes=16)
     nominal = nominal_of(Robot(), scenarios[0])
     ours, base = (
         usm_gym.evaluate(baselines.make(id, nominal), scenarios) for id in (folder.name, agent.base)

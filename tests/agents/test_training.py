@@ -56,7 +56,7 @@ SILENT = lambda steps, line: None  # noqa: E731
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    monkeypatch.setattr(training, "ROBOTS", {"ppo": 16, "sac": 4, "td3": 4, "tqc": 4})
+    monkeypatch.setattr(training, "ROBOTS", dict.fromkeys(algorithms.CLASSES, 4) | {"ppo": 16})
     monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
     monkeypatch.setattr(training, "TEST_EPISODES", 2)
 
@@ -79,6 +79,22 @@ def test_a_training_that_is_killed_ten_times_ends_with_the_same_bits(tmp_path):
     ]
     for ours, theirs in zip(*(model.policy.parameters() for model in models), strict=True):
         assert (ours == theirs).all()
+
+
+def test_a_recurrent_training_that_is_stopped_goes_on_with_its_memory(tmp_path):
+    plan = Plan(algorithm="recurrent-ppo", steps=1024, interval=256)
+    whole = train(plan, tmp_path / "whole", SILENT)
+
+    def stop(steps, line):
+        if steps >= 512:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(plan, tmp_path / "stopped", stop)
+    assert errors(train(plan, tmp_path / "stopped", SILENT)) == errors(whole)
+    scenarios = usm_gym.suite("operation")[:1]
+    policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path / "stopped"))
+    assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 
 def read_curve(folder):
@@ -108,7 +124,7 @@ def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeyp
     assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 
-@pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
+@pytest.mark.parametrize("algorithm", list(algorithms.CLASSES))
 def test_a_network_is_what_the_model_does(algorithm):
     envs = gym.make_vec(
         "agents:USM-OperationResidual-v0",
@@ -120,11 +136,14 @@ def test_a_network_is_what_the_model_does(algorithm):
     with torch.no_grad():
         for each in model.policy.parameters():
             each.mul_(3.0)
-    seen = np.random.default_rng(0).normal(size=(100, 44)).astype(np.float32)
-    expected, _ = model.predict(seen, deterministic=True)
-    found, _ = algorithms.network_of(algorithm, model).predict(seen)
-    np.testing.assert_allclose(found, expected, atol=1e-6)
-    assert np.abs(found).max() > 1e-4
+    random, network = np.random.default_rng(0), algorithms.network_of(algorithm, model)
+    their_state, our_state = None, None
+    for start in (np.ones(100, bool), np.zeros(100, bool), random.random(100) < 0.5):
+        seen = random.normal(size=(100, 44)).astype(np.float32)
+        expected, their_state = model.predict(seen, their_state, start, deterministic=True)
+        found, our_state = network.predict(seen, our_state, start)
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+        assert np.abs(found).max() > 1e-4
 
 
 def test_a_diverging_training_is_stopped_with_a_clear_word(tmp_path, monkeypatch):
