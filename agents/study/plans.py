@@ -31,7 +31,7 @@ AGENTS: dict[str, Plan] = {
     "residual-lqg-joints": Plan(base="lqg-joints-tuned", steps=1_500_000),
     "residual-torpedo": Plan(env="agents:USM-TorpedoResidual-v0", steps=1_000_000),
     "rl-only": Plan(base="zero", steps=2_000_000),
-    "residual-sac": Plan(algorithm="sac", residual_scale=6.0, steps=400_000),
+    "residual-sac": Plan(algorithm="sac", steps=400_000),
 }
 
 _SHORT = Plan(steps=1_000_000)
@@ -54,8 +54,12 @@ ABLATIONS: dict[str, Plan] = {
     "no-observer-states": replace(_SHORT, omit=OBSERVER_STATES),
     "no-kalman-states": replace(_SHORT, omit=KALMAN_STATES),
     "frames-not-kalman": replace(_SHORT, omit=KALMAN_STATES, frames=4),
+    "recurrent": replace(_SHORT, algorithm="recurrent-ppo"),
     "no-joint-references": replace(_SHORT, omit=JOINT_REFERENCES),
     "no-randomisation": replace(_SHORT, conditions=_EXACT),
+    # To be held against residual-sac.
+    "td3": Plan(algorithm="td3", steps=400_000),
+    "tqc": Plan(algorithm="tqc", steps=400_000),
 }
 PLANS = AGENTS | ABLATIONS
 # Seeds of each training at most.
