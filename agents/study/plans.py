@@ -55,6 +55,7 @@ ABLATIONS: dict[str, Plan] = {
     "no-kalman-states": replace(_SHORT, omit=KALMAN_STATES),
     "frames-not-kalman": replace(_SHORT, omit=KALMAN_STATES, frames=4),
     "recurrent": replace(_SHORT, algorithm="recurrent-ppo"),
+    "recurrent-not-kalman": replace(_SHORT, algorithm="recurrent-ppo", omit=KALMAN_STATES),
     "no-joint-references": replace(_SHORT, omit=JOINT_REFERENCES),
     "no-randomisation": replace(_SHORT, conditions=_EXACT),
     # To be held against residual-sac.
@@ -62,8 +63,9 @@ ABLATIONS: dict[str, Plan] = {
     "tqc": Plan(algorithm="tqc", steps=400_000),
 }
 PLANS = AGENTS | ABLATIONS
-# Seeds of each training at most.
-SEEDS = dict.fromkeys(AGENTS, 5) | dict.fromkeys(ABLATIONS, 3)
+# Seeds of each training at most: more where a small difference is to be told from chance.
+SEEDS = dict.fromkeys(AGENTS, 5) | dict.fromkeys(ABLATIONS, 1)
+SEEDS |= dict.fromkeys(("reference", "no-joint-references", "no-randomisation"), 3)
 
 # Classical policies beside which the agents stand.
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
