@@ -1,0 +1,16 @@
+"""Docstrings as Python sees them, where a class completes its own on import."""
+
+import importlib
+import inspect
+
+import griffe
+
+
+class RuntimeDocstrings(griffe.Extension):
+    """Takes docstrings with a table of the observation from the classes themselves."""
+
+    def on_class(self, *, cls, **_):
+        """Replace such a docstring."""
+        if cls.docstring and "OBSERVATION_TABLE" in cls.docstring.value:
+            found = getattr(importlib.import_module(cls.module.path), cls.name)
+            cls.docstring.value = inspect.getdoc(found)

@@ -1,0 +1,62 @@
+"""What the site takes from the rest of the repository: pages, results, notebooks, speed."""
+
+import json
+from pathlib import Path
+
+from mkdocs.structure.files import File
+
+import usm_gym
+from agents.commands.bench import MEANINGS
+from agents.terminal import figures
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "results" / usm_gym.__version__
+SPEED = "<!-- bench.json -->"
+
+
+def on_files(files, config):
+    """Add what lies outside `docs`."""
+    outside = {name: ROOT / name for name in ("CONTRIBUTING.md", "CHANGELOG.md")}
+    for kind in ("md", "png"):
+        for path in sorted(RESULTS.rglob(f"*.{kind}")):
+            outside[f"results/{path.relative_to(RESULTS).as_posix()}"] = path
+    for place, path in outside.items():
+        files.append(File.generated(config, place, abs_src_path=str(path)))
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook(path)))
+    return files
+
+
+def notebook(path):
+    """A notebook as a page."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    texts = [
+        "".join(cell["source"])
+        if cell["cell_type"] == "markdown"
+        else f"```python\n{''.join(cell['source'])}\n```"
+        for cell in cells
+    ]
+    source = f"From `{path.relative_to(ROOT).as_posix()}`, to be run cell by cell."
+    return "\n\n".join([texts[0], source, *texts[1:]])
+
+
+def on_page_markdown(markdown, **_):
+    """Put the measured speed in its place."""
+    return markdown.replace(SPEED, speed(RESULTS / "bench.json")) if SPEED in markdown else markdown
+
+
+def speed(path):
+    """The figures of `usm bench` as a table, with the command and the machine."""
+    if not path.exists():
+        return "No measurement has been published with this version."
+    found = json.loads(path.read_text(encoding="utf-8"))
+    lines = ["| what | median | smallest | largest |", "|---|---:|---:|---:|"]
+    for name, meaning in MEANINGS.items():
+        if name in found["spread"]:
+            spread = found["spread"][name]
+            numbers = " | ".join(figures(spread[key]) for key in ("median", "low", "high"))
+            lines.append(f"| {meaning} | {numbers} |")
+    machine, source = found["machine"], found["provenance"]
+    where = f"{machine['processor']}, {machine['cores']} cores, {machine['system']}"
+    by = f"By `{source['command']}`, commit {source['commit']}, on {where}."
+    return "\n".join([by, "", *lines])
