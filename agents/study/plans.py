@@ -65,7 +65,7 @@ ABLATIONS: dict[str, Plan] = {
 PLANS = AGENTS | ABLATIONS
 # Seeds of each training at most: more where a small difference is to be told from chance.
 SEEDS = dict.fromkeys(AGENTS, 5) | dict.fromkeys(ABLATIONS, 1)
-SEEDS |= dict.fromkeys(("reference", "no-joint-references", "no-randomisation"), 3)
+SEEDS |= dict.fromkeys(("reference", "no-joint-references"), 3)
 
 # Classical policies beside which the agents stand.
 RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
