@@ -49,8 +49,8 @@ def _curves(found: Document) -> Any:
                 errors = 1e3 * np.array(
                     [[point[f"max_error_{axis}"] for point in curve[:length]] for curve in curves]
                 )
-                colour = f"C{number % 10}"
-                panel.plot(steps, errors.mean(axis=0), color=colour, label=name)
+                colour, style = f"C{number % 10}", "-" if number < 10 else "--"
+                panel.plot(steps, errors.mean(axis=0), style, color=colour, label=name)
                 low, high = errors.min(axis=0), errors.max(axis=0)
                 panel.fill_between(steps, low, high, color=colour, alpha=SHADE, linewidth=0)
             panel.set(yscale="log", xlabel="million steps", ylabel=f"error in {axis} [mm]")

@@ -12,22 +12,10 @@ from agents.study.scores import Document, steps_to
 from agents.terminal import figures, mm
 
 LEGEND = """\
-Largest position error after settling, mm, over unseen scenarios and all seeds: mean with its 95 %
-interval (episodes are resampled within each seed), mean of the middle half, mean of the best and of
-the worst seed; thrust variation, N/s, and effort, N; episodes lost.
+Largest position error after settling, mm, over unseen scenarios and all seeds: mean, and mean of
+the middle half of the episodes, each with its 95 % interval (episodes are resampled within each
+seed); means of the best and of the worst seed; thrust variation, N/s, and effort, N; episodes lost.
 """
-COLUMNS = (
-    "seeds",
-    "x, mm",
-    "y, mm",
-    "middle half x",
-    "middle half y",
-    "seeds x",
-    "seeds y",
-    "variation, N/s",
-    "thrust, N",
-    "lost",
-)
 
 
 def markdown(found: Document) -> str:
@@ -37,13 +25,16 @@ def markdown(found: Document) -> str:
     parts = ["# Study of residual agents\n", LEGEND]
     if agents:
         parts += ["## Agents\n", table(agents), "## Classical policies\n", table(found["rivals"])]
+        parts += ["![Error against thrust variation](front.png)\n"]
         parts += ["## Agents against classical policies\n", AGAINST]
         parts += [against(rows) for rows in by_mode(agents, found["against"])]
         parts += ["## How soon\n", SOON, soon(agents)]
         parts += ["## Elsewhere\n", ELSEWHERE, elsewhere({**agents, **found["rivals"]})]
         parts += ["## What the agents do to their bases\n", DISSECTED, taken(found["dissected"])]
+        parts += ["![Spectra of the forces](spectra.png)\n"]
     if others:
         parts += ["## Ablations\n", table(others)]
+    parts += ["## Learning curves\n", "![Error against steps](curves.png)\n"]
     parts += ["## Commands\n", commands(found)]
     return "\n".join(parts)
 
@@ -70,17 +61,25 @@ the needed force; "late" is by how much the whole force follows the needed one. 
 
 
 def table(rows: Mapping[str, Any]) -> str:
-    """Scores at home."""
-    lines = [_line(("policy", *COLUMNS)), "|---|" + "---:|" * len(COLUMNS)]
-    for name, each in rows.items():
-        scores = each["scores"][HOME]
-        errors = [scores[f"max_error_{axis}"] for axis in "xy"]
-        cells = [name, str(len(errors[0]["seeds"]))]
-        cells += [f"{mm(e['mean'])} [{mm(e['ci95'][0])}, {mm(e['ci95'][1])}]" for e in errors]
-        cells += [mm(e["iqm"]) for e in errors]
-        cells += [f"{mm(min(e['seeds']))} to {mm(max(e['seeds']))}" for e in errors]
-        cells += [figures(scores[key]["mean"]) for key in ("thrust_variation", "thrust_effort")]
-        lines.append(_line([*cells, str(scores["failures"])]))
+    """Scores at home; those over seeds, where there are some."""
+    axes = [f"max_error_{axis}" for axis in "xy"]
+    scores = {name: each["scores"][HOME] for name, each in rows.items()}
+    several = any(len(each[axes[0]]["seeds"]) > 1 for each in scores.values())
+    columns = ["x, mm", "y, mm", "middle half x", "middle half y"]
+    columns += ["seeds", "seeds x", "seeds y"] if several else []
+    columns += ["variation, N/s", "thrust, N", "lost"]
+    lines = [_line(("policy", *columns)), "|---|" + "---:|" * len(columns)]
+    for name, each in scores.items():
+        cells = [name]
+        for kind, limits in (("mean", "ci95"), ("iqm", "iqm_ci95")):
+            for axis in axes:
+                low, high = each[axis][limits]
+                cells.append(f"{mm(each[axis][kind])} [{mm(low)}, {mm(high)}]")
+        if several:
+            seeds = [each[axis]["seeds"] for axis in axes]
+            cells += [str(len(seeds[0])), *(f"{mm(min(m))} to {mm(max(m))}" for m in seeds)]
+        cells += [figures(each[key]["mean"]) for key in ("thrust_variation", "thrust_effort")]
+        lines.append(_line([*cells, str(each["failures"])]))
     return "\n".join(lines) + "\n"
 
 
