@@ -3,19 +3,16 @@
 import dataclasses
 import json
 import re
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from usm_gym import Conditions, Scenario, suite
-from usm_gym.conditions import PRESETS, conditions_of
+from usm_gym import Conditions, Scenario
+from usm_gym.conditions import PRESETS
 from usm_gym.scenario import MODES, NOISE, WATER, Mode, named, sample
 from usm_gym.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION, stream
-from usm_gym.suites import NAMES
-from usm_gym.suites import __main__ as writer
 
 Array = NDArray[np.float64]
 
@@ -129,41 +126,6 @@ def test_what_is_wrong_is_named(fields: dict[str, Any], names: list[str]) -> Non
         Scenario.from_dict(fields)
     for name in names:
         assert name in str(error.value)
-
-
-def test_presets_are_those_of_the_documentation() -> None:
-    shared = {
-        "control_period": 0.02,
-        "physics_step": 1e-3,
-        "integrator": "symplectic",
-        "hydrodynamics": "consistent",
-        "motion": True,
-    }
-    table = {  # ideal, field, rough
-        "thruster_time_constant": (0.0, 0.05, 0.1),
-        "thruster_limit": (100.0, 20.0, 15.0),
-        "position_noise": (0.0, 5e-5, 2e-4),
-        "current_limit": (0.0, 0.05, 0.1),
-        "coefficient_range": ((1.0, 1.0), (0.8, 1.2), (0.6, 1.5)),
-        "deflection_range": ((0.7, 1.75), (0.7, 1.75), (0.9, 2.1)),
-        "filter_range": ((6.0, 12.0), (6.0, 12.0), (8.0, 14.0)),
-    }
-    for k, name in enumerate(("ideal", "field", "rough")):
-        preset = dataclasses.asdict(PRESETS[name])
-        variation = preset.pop("current_variation")
-        assert (variation > 0.0) == (name == "rough")
-        assert preset == shared | {field: values[k] for field, values in table.items()}
-    assert conditions_of("rough") == PRESETS["rough"]
-    assert Conditions() == PRESETS["field"]
-
-
-def test_conditions_may_be_fields_on_top_of_field() -> None:
-    expected = dataclasses.replace(PRESETS["field"], thruster_time_constant=0.2)
-    assert conditions_of({"thruster_time_constant": 0.2}) == expected
-    assert conditions_of(expected) is expected
-    for wrong, named_ in (("mild", "ideal, field, rough"), ({"lag": 0.1}, "lag"), (3, "3")):
-        with pytest.raises(ValueError, match=named_):
-            conditions_of(wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -354,64 +316,3 @@ def test_under_other_conditions_path_and_motion_are_the_same() -> None:
         )
         restored = dataclasses.replace(rough, conditions=scenario.conditions, water=scenario.water)
         assert restored == scenario
-
-
-@pytest.mark.parametrize(
-    ("name", "count", "mode", "preset"),
-    [
-        ("operation", 50, "operation", "field"),
-        ("operation-ideal", 20, "operation", "ideal"),
-        ("operation-rough", 50, "operation", "rough"),
-        ("torpedo", 50, "torpedo", "field"),
-    ],
-)
-def test_suites_are_as_documented(name: str, count: int, mode: str, preset: str) -> None:
-    scenarios = suite(name)
-    assert len(scenarios) == len(set(scenarios)) == count
-    assert {(s.mode, s.conditions) for s in scenarios} == {(mode, PRESETS[preset])}
-
-
-def test_the_suite_of_table_1_is_its_two_scenarios() -> None:
-    assert suite("table1") == [named("table1", "operation"), named("table1", "torpedo")]
-
-
-def test_a_suite_given_away_is_not_changed_by_its_user() -> None:
-    suite("torpedo").clear()
-    assert len(suite("torpedo")) == 50
-    with pytest.raises(ValueError, match="operation-ideal"):
-        suite("oepration")
-
-
-def test_no_suite_holds_a_scenario_of_another_or_of_any_seed() -> None:
-    frozen = [s for name in NAMES for s in suite(name)]
-    assert len({s.noise_seed for s in frozen if s.noise_seed}) == len(frozen) - 2
-    seeds = {s.noise_seed for s in frozen}
-    paths = {s.path for s in frozen}
-    for seed in (0, 1, writer.SEED):
-        for purpose in (EVALUATION, TRAINING, TUNING, VALIDATION):
-            for k in range(50):
-                scenario = sample("operation", PRESETS["field"], stream(seed, purpose, k))
-                assert scenario.noise_seed not in seeds
-                assert scenario.path not in paths
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_suites_come_from_their_recorded_seed_bit_for_bit(
-    name: str, tmp_path: File, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    frozen = File(writer.__file__).with_name(f"{name}.json")
-    assert json.loads(frozen.read_text())["seed"] == writer.SEED
-    assert writer.scenarios(name) == suite(name)
-    monkeypatch.setattr(writer, "__file__", str(tmp_path / "__main__.py"))
-    writer.main(name)
-    assert (tmp_path / frozen.name).read_bytes() == frozen.read_bytes()
-
-
-@pytest.mark.parametrize("name", [*NAMES, "another"])
-def test_no_suite_is_written_twice(name: str) -> None:
-    folder = File(writer.__file__).parent
-    before = {file: file.read_bytes() for file in folder.glob("*.json")}
-    assert len(before) == len(NAMES)
-    with pytest.raises(ValueError, match=name):
-        writer.main(name)
-    assert {file: file.read_bytes() for file in folder.glob("*.json")} == before

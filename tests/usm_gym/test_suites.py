@@ -1,0 +1,74 @@
+"""The frozen suites: what they hold, where they come from, and that they stay as they are."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from usm_gym import suite
+from usm_gym.conditions import PRESETS
+from usm_gym.scenario import named, sample
+from usm_gym.seeding import EVALUATION, TRAINING, TUNING, VALIDATION, stream
+from usm_gym.suites import NAMES
+from usm_gym.suites import __main__ as writer
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "mode", "preset"),
+    [
+        ("operation", 50, "operation", "field"),
+        ("operation-ideal", 20, "operation", "ideal"),
+        ("operation-rough", 50, "operation", "rough"),
+        ("torpedo", 50, "torpedo", "field"),
+    ],
+)
+def test_suites_are_as_documented(name: str, count: int, mode: str, preset: str) -> None:
+    scenarios = suite(name)
+    assert len(scenarios) == len(set(scenarios)) == count
+    assert {(s.mode, s.conditions) for s in scenarios} == {(mode, PRESETS[preset])}
+
+
+def test_the_suite_of_table_1_is_its_two_scenarios() -> None:
+    assert suite("table1") == [named("table1", "operation"), named("table1", "torpedo")]
+
+
+def test_a_suite_given_away_is_not_changed_by_its_user() -> None:
+    suite("torpedo").clear()
+    assert len(suite("torpedo")) == 50
+    with pytest.raises(ValueError, match="operation-ideal"):
+        suite("oepration")
+
+
+def test_no_suite_holds_a_scenario_of_another_or_of_any_seed() -> None:
+    frozen = [s for name in NAMES for s in suite(name)]
+    assert len({s.noise_seed for s in frozen if s.noise_seed}) == len(frozen) - 2
+    seeds = {s.noise_seed for s in frozen}
+    paths = {s.path for s in frozen}
+    for seed in (0, 1, writer.SEED):
+        for purpose in (EVALUATION, TRAINING, TUNING, VALIDATION):
+            for k in range(50):
+                scenario = sample("operation", PRESETS["field"], stream(seed, purpose, k))
+                assert scenario.noise_seed not in seeds
+                assert scenario.path not in paths
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_suites_come_from_their_recorded_seed_bit_for_bit(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frozen = Path(writer.__file__).with_name(f"{name}.json")
+    assert json.loads(frozen.read_text())["seed"] == writer.SEED
+    assert writer.scenarios(name) == suite(name)
+    monkeypatch.setattr(writer, "__file__", str(tmp_path / "__main__.py"))
+    writer.main(name)
+    assert (tmp_path / frozen.name).read_bytes() == frozen.read_bytes()
+
+
+@pytest.mark.parametrize("name", [*NAMES, "another"])
+def test_no_suite_is_written_twice(name: str) -> None:
+    folder = Path(writer.__file__).parent
+    before = {file: file.read_bytes() for file in folder.glob("*.json")}
+    assert len(before) == len(NAMES)
+    with pytest.raises(ValueError, match=name):
+        writer.main(name)
+    assert {file: file.read_bytes() for file in folder.glob("*.json")} == before
