@@ -41,7 +41,7 @@ COMMANDS = (
 
 DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
-A first look, in half a minute:
+A first look:
 
   usm evaluate                 every policy on the fifty frozen operation scenarios
   usm policies                 what there is to compare
