@@ -6,6 +6,8 @@ from html import unescape
 from latex2mathml.converter import convert
 from mkdocs.exceptions import PluginError
 
+# What GitHub takes, and what latex2mathml does instead.
+DIALECT = {r"\cr": r"\\", "{aligned}": "{align*}"}
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 
 
@@ -16,8 +18,11 @@ def on_page_content(html, **_):
 
 def formula(latex, block):
     """A formula as MathML."""
-    # Of the two commands for a new row GitHub takes only \cr, latex2mathml only \\.
-    drawn = convert(latex.replace(r"\cr", r"\\"), display="block" if block else "inline")
-    if "\\" in drawn:
+    known = latex
+    for ours, theirs in DIALECT.items():
+        known = known.replace(ours, theirs)
+    drawn = convert(known, display="block" if block else "inline")
+    # What latex2mathml does not know it hands on as it is.
+    if "\\" in drawn or "<mi>&</mi>" in drawn:
         raise PluginError(f"formula is {latex}; allowed: what latex2mathml knows")
     return drawn
