@@ -38,7 +38,7 @@ def _curves(found: Document) -> Any:
     ]
     kinds = [(title, names) for title, names in kinds if names]
     figure, grid = plt.subplots(
-        len(kinds), 2, figsize=(10, 4.2 * len(kinds)), squeeze=False, layout="constrained"
+        len(kinds), 2, figsize=(11.5, 4.2 * len(kinds)), squeeze=False, layout="constrained"
     )
     for panels, (title, names) in zip(grid, kinds, strict=True):
         for panel, axis in zip(panels, "xy", strict=True):
@@ -56,7 +56,7 @@ def _curves(found: Document) -> Any:
             panel.set(yscale="log", xlabel="million steps", ylabel=f"error in {axis} [mm]")
             panel.grid(alpha=0.3)
         panels[0].set_title(f"{title}: mean over seeds, and from the best seed to the worst")
-        panels[1].legend(fontsize=8)
+        panels[1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0))
     return figure
 
 

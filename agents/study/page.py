@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from agents.study.plans import HOME, TRANSFER
-from agents.study.scores import Document, steps_to
+from agents.study.scores import Document, best_so_far, steps_to
 from agents.terminal import figures, mm
 
 LEGEND = """\
@@ -44,8 +42,9 @@ Ratio of the means in x / y over all seeds, with its 95 % interval; in what shar
 agent, as its seed 0, is better in both axes; and how many of its seeds are better in both means.
 """
 SOON = """\
-Steps after which the validated error, x + y, in the mean over the seeds, is as small as that with
-which the training of another agent ends.
+Steps after which the best agents so far are as good as the best ones of another training, by the
+validated error x + y, the median over the seeds; trainings are validated every quarter of a million
+steps.
 """
 ELSEWHERE = """\
 Mean errors x / y, mm, under other conditions than those of the training: without noise, lag and
@@ -109,16 +108,14 @@ def against(found: Mapping[str, Any]) -> str:
 
 
 def soon(agents: Mapping[str, Any]) -> str:
-    """How soon each agent is as good as each other one is in the end."""
+    """How soon each agent is as good as each other one becomes."""
     lines = [_line(("agent", *agents)), "|---|" + "---:|" * len(agents)]
     for name, each in agents.items():
         cells = [name]
         for other in agents.values():
-            last = [curve[-1] for curve in other["curves"].values()]
-            error = np.mean([point["max_error_x"] + point["max_error_y"] for point in last])
-            steps = (
-                steps_to(each["curves"], float(error)) if other["mode"] == each["mode"] else None
-            )
+            error = min(best_so_far(other["curves"]).values())
+            comparable = other["mode"] == each["mode"]
+            steps = steps_to(each["curves"], error) if comparable else None
             cells.append("" if steps is None else f"{steps / 1e6:.2f} M")
         lines.append(_line(cells))
     return "\n".join(lines) + "\n"

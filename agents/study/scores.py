@@ -195,9 +195,16 @@ def against(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> dict[str, Any
     }
 
 
+def best_so_far(curves: Mapping[str, Any]) -> dict[int, float]:
+    """By steps: validated error x + y of the best agent so far, the median over the seeds, m."""
+    errors = [
+        np.minimum.accumulate([point["max_error_x"] + point["max_error_y"] for point in curve])
+        for curve in curves.values()
+    ]
+    points = zip(next(iter(curves.values())), zip(*errors, strict=False), strict=False)
+    return {point["steps"]: float(np.median(each)) for point, each in points}
+
+
 def steps_to(curves: Mapping[str, Any], error: float) -> int | None:
-    """After how many steps the mean of the seeds' validated errors, x + y, is no larger; m."""
-    for points in zip(*curves.values(), strict=False):
-        if np.mean([point["max_error_x"] + point["max_error_y"] for point in points]) <= error:
-            return int(points[0]["steps"])
-    return None
+    """After how many steps the best agents so far are as good as that; see `best_so_far`."""
+    return next((steps for steps, each in best_so_far(curves).items() if each <= error), None)

@@ -12,7 +12,7 @@ from agents.main import main
 from agents.study import dissection, page, plans, scores, trainings
 from agents.study.dissection import lateness
 from agents.study.plans import PLANS, SEEDS, TRANSFER
-from agents.study.scores import steps_to
+from agents.study.scores import best_so_far, steps_to
 from agents.study.trainings import runs
 from usm_gym.conditions import FIELD
 
@@ -110,14 +110,15 @@ def test_lateness_is_found():
     assert lateness(np.roll(needed, -3, axis=0), needed) == -3
 
 
-def test_steps_to_an_error_are_read_off_the_mean_of_the_curves():
+def test_steps_to_an_error_are_those_of_the_best_agents_so_far():
     def curve(*errors):
         return [
             {"steps": 100 * k, "max_error_x": error, "max_error_y": 0.0}
             for k, error in enumerate(errors)
         ]
 
-    curves = {"0": curve(5.0, 3.0, 1.0), "1": curve(5.0, 1.0, 1.0)}
+    curves = {"0": curve(5.0, 3.0, 1.0), "1": curve(5.0, 1.0, 9.0)}
+    assert best_so_far(curves) == {0: 5.0, 100: 2.0, 200: 1.0}
     assert steps_to(curves, 5.0) == 0
     assert steps_to(curves, 1.9) == 200
     assert steps_to(curves, 0.5) is None
