@@ -35,7 +35,8 @@ def check_installed(what: str, extra: str, *modules: str) -> None:
     """
     for module in modules:
         if find_spec(module) is None:
-            raise ValueError(f"{what} needs {module}: pip install 'usm-gym[{extra}]'")
+            package = module.replace("_", "-")
+            raise ValueError(f"{what} needs {package}: pip install 'usm-gym[{extra}]'")
 
 
 def add_computing(parser: argparse.ArgumentParser) -> None:
