@@ -1,14 +1,68 @@
-"""Files that are either whole or not there."""
+"""Files: read only if they are what we expect, written whole or not at all."""
 
 from __future__ import annotations
 
 import json
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from usm_gym.validation import clipped, require
+
+# Nothing that the packages read is larger, bytes.
+LARGEST = 512 * 2**20
+
+
+def read_bytes(path: str | Path, largest: int = LARGEST, links: bool = True) -> bytes:
+    """Read a regular file; a pipe or a device is refused, and never waited for.
+
+    Args:
+        path: The file.
+        largest: How many bytes it may have.
+        links: Whether it may be a symbolic link.
+
+    Raises:
+        ValueError: If it is no regular file, too large, or a symbolic link where none is allowed.
+        OSError: If it cannot be read.
+    """
+    name = f"file {path}"
+    require(links or not Path(path).is_symlink(), name, "a symbolic link", "a regular file")
+    # Without O_NONBLOCK the opening of a pipe would wait for somebody to write.
+    flags = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    flags |= 0 if links else getattr(os, "O_NOFOLLOW", 0)
+    with open(os.open(path, os.O_RDONLY | flags), "rb") as file:
+        found = os.fstat(file.fileno())
+        require(stat.S_ISREG(found.st_mode), name, stat.filemode(found.st_mode), "a regular file")
+        require(found.st_size <= largest, name, f"{found.st_size} bytes", f"up to {largest} bytes")
+        return file.read(largest)
+
+
+def read_json(path: str | Path, links: bool = True) -> Any:
+    """Read a file of JSON.
+
+    Raises:
+        ValueError: If it holds no JSON, or is no file as `read_bytes` takes it.
+        OSError: If it cannot be read.
+    """
+    return parse_json(read_bytes(path, links=links), f"file {path}")
+
+
+def parse_json(text: str | bytes, name: str) -> Any:
+    """Parse JSON; `name` says in errors what it is.
+
+    Raises:
+        ValueError: If it is no JSON, or nested too deeply to be read.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError(f"{clipped(name)} is nested too deeply") from error
+    except ValueError as error:
+        raise ValueError(f"{clipped(name)} is no JSON: {clipped(str(error))}") from error
 
 
 def check_writable(path: str | Path) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import reprlib
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, Strict, ValidationError
 
@@ -14,6 +15,14 @@ NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Switch = Annotated[bool, Strict()]
 
+# How many characters of an input an error quotes, how many of its own words it has, and how many
+# faults of one input it names.
+QUOTED, SAID, FAULTS = 80, 1000, 3
+
+_repr = reprlib.Repr()
+_repr.maxlevel = 3
+_repr.maxstring = _repr.maxother = _repr.maxlong = QUOTED
+
 
 def require(condition: object, name: str, value: object, allowed: str) -> None:
     """Raise a `ValueError` that names the argument, its value and what is allowed.
@@ -21,25 +30,50 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
     Args:
         condition: Whether the value is acceptable.
         name: Name of the argument or field.
-        value: What was given.
+        value: What was given; `brief` shortens it.
         allowed: What would have been accepted, in words.
 
     Raises:
         ValueError: If the condition does not hold.
     """
     if not condition:
-        raise ValueError(f"{name} is {value!r}; allowed: {allowed}")
+        raise ValueError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
+
+
+def brief(value: object) -> str:
+    """Quote a value in one line of at most `QUOTED` characters, however large or odd it is."""
+    try:
+        return clipped(_repr.repr(value))
+    except ValueError:  # an integer of more digits than Python is willing to print
+        return f"<{type(value).__name__}>"
+
+
+def clipped(text: str, most: int = QUOTED) -> str:
+    """Put a text on one line of at most so many characters, without its middle if it is longer."""
+    line = " ".join(text[: 10 * most].split())
+    if len(line) <= most and len(text) <= 10 * most:
+        return line
+    tail = " ".join(text[-most:].split())
+    return f"{line[: most // 2]}...{tail[-(most // 2 - 3) :]}"
 
 
 def in_one_line(error: BaseException) -> str:
     """Say on one line what an exception says, each wrong field with its value."""
-    if not isinstance(error, ValidationError):
-        return " ".join(str(error).split())
-    faults = []
-    for fault in error.errors():
-        if fault["type"] == "value_error":  # one of ours, complete in itself
-            faults.append(fault["msg"].removeprefix("Value error, "))
-        else:
-            field = ".".join(str(part) for part in fault["loc"])
-            faults.append(f"{field} is {fault['input']!r}: {fault['msg']}")
-    return "; ".join(faults)
+    if isinstance(error, ValidationError):
+        return _faults(error)
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.strerror}: {brief(str(error.filename))}"
+    return clipped(str(error), SAID)
+
+
+def _faults(error: ValidationError) -> str:
+    faults = [_fault(fault) for fault in error.errors(include_url=False)[:FAULTS]]
+    more = error.error_count() - len(faults)
+    return "; ".join(faults) + (f"; and {more} more" if more else "")
+
+
+def _fault(fault: Any) -> str:
+    if fault["type"] == "value_error":  # one of ours, complete in itself
+        return clipped(fault["msg"].removeprefix("Value error, "), SAID)
+    field = clipped(".".join(str(part) for part in fault["loc"]))
+    return f"{field} is {brief(fault['input'])}: {fault['msg']}"
