@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import reprlib
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
 
-from pydantic import ConfigDict, Field, Strict, ValidationError
+from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+
+T = TypeVar("T")
 
 CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -38,6 +41,26 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
     """
     if not condition:
         raise ValueError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
+
+
+def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dict of fields") -> T:
+    """Make an object of a validated type from a dict of its fields.
+
+    Args:
+        adapter: The type.
+        name: Name of the argument that the dict was given for.
+        fields: Values by name; those left out have their defaults.
+        allowed: What would have been accepted, in words.
+
+    Raises:
+        ValueError: If it is no dict, a field is unknown, or a value not allowed.
+    """
+    named = isinstance(fields, Mapping) and all(isinstance(field, str) for field in fields)
+    require(named, name, fields, allowed)
+    try:
+        return adapter.validate_python(dict(fields))
+    except ValidationError as error:
+        raise ValueError(in_one_line(error)) from error
 
 
 def brief(value: object) -> str:
