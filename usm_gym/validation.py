@@ -85,7 +85,10 @@ def in_one_line(error: BaseException) -> str:
     if isinstance(error, ValidationError):
         return _faults(error)
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        return f"{error.strerror}: {brief(str(error.filename))}"
+        # Paths are long, and a path without its middle is of little use.
+        return f"{error.strerror}: {clipped(str(error.filename), 3 * QUOTED)}"
+    if isinstance(error, KeyError) and error.args:
+        return f"{brief(error.args[0])} is missing"
     return clipped(str(error), SAID)
 
 
