@@ -18,7 +18,7 @@ from usm_gym.nominal import Nominal
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant.compile import compiled
 from usm_gym.plant.thrusters import allocate
-from usm_gym.validation import Count, Number, require
+from usm_gym.validation import Count, Number, is_whole, require
 
 Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -102,12 +102,7 @@ class Residual:
             residual_scale,
             f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
         )
-        require(
-            isinstance(frames, int) and 1 <= frames <= MOST_FRAMES,
-            "frames",
-            frames,
-            f"1 to {MOST_FRAMES}",
-        )
+        require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
         if isinstance(base, str):
             named = contender(base)
             require(not named.privileged, "base", base, "a policy that is not given true state")

@@ -16,9 +16,9 @@ from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.reward import reward, reward_of_loss
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Mode, Scenario, named, sample
+from usm_gym.scenario import Mode, Scenario, mode_of, named, sample
 from usm_gym.simulation import Simulation, Snapshot
-from usm_gym.validation import brief, require
+from usm_gym.validation import brief, is_whole, require
 from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observation = NDArray[np.float32]
@@ -112,7 +112,7 @@ window shows every step in real time (both need the extra `render`) |
             ValueError: If a condition, a field of the robot or the render mode is not allowed.
             gymnasium.error.DependencyNotInstalled: If the render mode needs the extra `render`.
         """
-        self.mode = mode
+        self.mode: Mode = mode_of(mode)
         self.conditions = conditions_of(conditions)
         self.robot = robot_of(robot)
         self.render_mode = render_mode
@@ -263,8 +263,7 @@ def checked_seed(seed: Any) -> int | None:
     Raises:
         ValueError: If it is neither.
     """
-    valid = seed is None or (isinstance(seed, (int, np.integer)) and seed >= 0)
-    require(valid, "seed", seed, "None or an integer from 0 on")
+    require(seed is None or is_whole(seed, 0), "seed", seed, "None or an integer from 0 on")
     return None if seed is None else int(seed)
 
 

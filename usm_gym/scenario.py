@@ -243,6 +243,17 @@ def draw_water(conditions: Conditions, noise_seed: int) -> Water:
     )
 
 
+def mode_of(value: Any) -> Mode:
+    """The mode of a name.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
+    mode: Mode = value
+    return mode
+
+
 def sample(
     mode: Mode, conditions: Conditions, stream: np.random.Generator, joints: int = 15
 ) -> Scenario:
@@ -254,8 +265,7 @@ def sample(
         stream: Where all randomness comes from.
         joints: Number of joints of the robot; a third to eleven fifteenths of them bend.
     """
-    require(mode in MODES, "mode", mode, " or ".join(MODES))
-    if mode == "torpedo":
+    if mode_of(mode) == "torpedo":
         path = Path(
             speed=stream.uniform(0.05, 0.3),
             amplitude=stream.uniform(0.0, 0.5),

@@ -6,6 +6,7 @@ import reprlib
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
+import numpy as np
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
@@ -41,6 +42,13 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
     """
     if not condition:
         raise ValueError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
+
+
+def is_whole(value: object, low: int, high: int | None = None) -> bool:
+    """Whether a value is an integer, and no truth value, from `low` to `high`."""
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
+        return False
+    return bool(low <= value and (high is None or value <= high))
 
 
 def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dict of fields") -> T:
@@ -102,4 +110,6 @@ def _fault(fault: Any) -> str:
     if fault["type"] == "value_error":  # one of ours, complete in itself
         return clipped(fault["msg"].removeprefix("Value error, "), SAID)
     field = clipped(".".join(str(part) for part in fault["loc"]))
+    if fault["type"] == "missing":
+        return f"{field} is missing"
     return f"{field} is {brief(fault['input'])}: {fault['msg']}"

@@ -27,9 +27,9 @@ from usm_gym.env import (
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Mode, Scenario, named
+from usm_gym.scenario import Mode, Scenario, mode_of, named
 from usm_gym.simulation import Simulation, Snapshot
-from usm_gym.validation import require
+from usm_gym.validation import is_whole, require
 from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observations = NDArray[np.float32]
@@ -94,21 +94,17 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         Raises:
             ValueError: If an argument is not allowed.
         """
+        allowed = f"1 to {MOST_ROBOTS}"
+        require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)
+        require(is_whole(threads, 1), "threads", threads, "1 or more")
         require(
-            isinstance(num_envs, int) and 1 <= num_envs <= MOST_ROBOTS,
-            "num_envs",
-            num_envs,
-            f"1 to {MOST_ROBOTS}",
-        )
-        require(isinstance(threads, int) and threads >= 1, "threads", threads, "1 or more")
-        require(
-            isinstance(render_index, int) and 0 <= render_index < num_envs,
+            is_whole(render_index, 0, num_envs - 1),
             "render_index",
             render_index,
             f"0 to {num_envs - 1}",
         )
         self.num_envs = num_envs
-        self.mode = mode
+        self.mode: Mode = mode_of(mode)
         self.conditions = conditions_of(conditions)
         self.robot = robot_of(robot)
         self.threads = threads
@@ -264,7 +260,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         return streams
 
     def _seeds(self, seed: Any) -> list[int | None]:
-        if isinstance(seed, (list, tuple, np.ndarray)):
+        if isinstance(seed, (list, tuple)) or (isinstance(seed, np.ndarray) and seed.ndim):
             require(len(seed) == self.num_envs, "seed", seed, f"{self.num_envs} seeds")
             return [checked_seed(each) for each in seed]
         first = checked_seed(seed)
