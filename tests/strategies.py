@@ -86,6 +86,10 @@ def valid(schema: dict[str, Any], defs: dict[str, Any]) -> st.SearchStrategy[Any
         optional = {name: valid(each, defs) for name, each in schema["properties"].items()}
         needed = {name: optional.pop(name) for name in schema.get("required", ())}
         return st.fixed_dictionaries(needed, optional=optional)
+    if kind == "object":
+        values = schema.get("additionalProperties")
+        inner = valid(values, defs) if isinstance(values, dict) else JSON
+        return st.dictionaries(st.text(max_size=8), inner, max_size=3)
     if kind == "array" and "prefixItems" in schema:
         return st.tuples(*(valid(each, defs) for each in schema["prefixItems"])).map(list)
     if kind == "array":
