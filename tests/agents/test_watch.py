@@ -116,7 +116,7 @@ def test_a_lost_robot_keeps_its_last_picture():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--speed", "0"], "--speed is 0.0; allowed: a number > 0"),
+        (["--speed", "0"], "--speed is 0.0; allowed: 0.01 to 1000"),
         (["--speed", "inf"], "--speed is inf"),
         (["--output", "run.avi"], "--output is 'run.avi'; allowed: a file .mp4 or .gif"),
         (["--output", "missing/run.mp4"], "no directory missing"),
