@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.plant import layout
 from usm_gym.plant.chain import Body, accelerate_all
 from usm_gym.robot import Hydrodynamics, Robot
-from usm_gym.validation import brief, require
+from usm_gym.validation import brief, real_array, require
 
 Array = NDArray[np.float64]
 
@@ -116,10 +116,9 @@ def _blocks(
 
 
 def _vectors(name: str, value: Any, size: int) -> Array:
-    array = np.asarray(value)
+    array = real_array(name, value)
     allowed = f"an array of shape ({size},) or (..., {size})"
     require(array.ndim >= 1 and array.shape[-1] == size, name, value, allowed)
-    require(array.dtype.kind in "biuf", name, value, "real numbers")
     require(np.isfinite(array).all(), name, value, "finite numbers")
     return np.asarray(array, np.float64)
 

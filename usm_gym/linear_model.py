@@ -14,7 +14,7 @@ from usm_gym.nominal import Nominal
 from usm_gym.plant import layout as rows
 from usm_gym.scenario import STILL, Scenario
 from usm_gym.simulation import Simulation
-from usm_gym.validation import require
+from usm_gym.validation import real_array, require
 
 Array = NDArray[np.float64]
 
@@ -195,7 +195,6 @@ def _differences(simulation: Simulation) -> tuple[Array, Array]:
 
 
 def _finite(name: str, value: Any) -> Array:
-    array = np.asarray(value)
-    finite = array.dtype.kind in "biuf" and np.isfinite(array).all()
-    require(finite, name, value, "finite numbers")
+    array = real_array(name, value)
+    require(np.isfinite(array).all(), name, value, "finite numbers")
     return array.astype(np.float64)
