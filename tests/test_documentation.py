@@ -42,6 +42,7 @@ LEFT_OUT = (
     "pip install",
     "pre-commit",
     "pytest",
+    "HYPOTHESIS_PROFILE",
     "mkdocs",
     "usm bench",
     "usm reproduce",
