@@ -128,6 +128,10 @@ class Simulation:
         """True position of the centre of mass, m, (size, 2)."""
         return np.stack([self._column(rows.P_X), self._column(rows.P_Y)], axis=1)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._share_out()  # what was one array before pickling has become two
+
     def start(self, index: int, scenario: Scenario) -> None:
         """Put one robot at the beginning of a scenario.
 

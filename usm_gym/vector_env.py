@@ -73,11 +73,12 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             mode: "operation" or "torpedo".
             conditions: As of `USMEnv`.
             robot: As of `USMEnv`.
-            render_mode: As of `USMEnv`, of one robot.
+            render_mode: As of `USMEnv`: "rgb_array" gives an image of each robot, "human" shows one
+                robot in a window.
             autoreset_mode: What happens to a robot whose episode has ended.
             threads: How many threads share a step, at most one per core; without effect on its
                 result.
-            render_index: Which robot is rendered.
+            render_index: Which robot the window shows.
 
         Raises:
             ValueError: If an argument is not allowed.
@@ -102,7 +103,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             "render_fps": render_fps(self.conditions),
             "autoreset_mode": self.autoreset_mode,
         }
-        self._viewer = None if render_mode is None else Viewer(render_mode, render_index)
+        self._viewer = None if render_mode is None else Viewer(render_mode, num_envs, render_index)
         self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
         self.single_observation_space = self.layout.space
         self.single_action_space = action_space(self.robot)
@@ -198,12 +199,15 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             stream.bit_generator.state = state
         self._done = snapshot.done.copy()
 
-    def render(self) -> tuple[NDArray[np.uint8]] | None:
-        """An image of the robot `render_index` in a tuple, in the mode "rgb_array"; else None."""
-        if self._viewer is None:
-            return None
-        frame = self._viewer.render(self.simulation)
-        return None if frame is None else (frame,)
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """An image of each robot, (480, 640, 3), in the mode "rgb_array"; otherwise None.
+
+        Each takes about 10 ms to draw and 0.9 MB.
+
+        Raises:
+            gymnasium.error.DependencyNotInstalled: Without the extra `render`.
+        """
+        return None if self._viewer is None else self._viewer.render(self.simulation)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
