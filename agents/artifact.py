@@ -10,26 +10,28 @@ import json
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
+from pydantic import Field, Strict, TypeAdapter
 from pydantic.dataclasses import dataclass
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from agents.network import Activation, Network, Output, Recurrence
-from agents.residual import ActionKind, Residual, ResidualPolicy
+from agents.residual import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from baselines.contender import Contender, fingerprint
+from baselines.gains import Gain
 from baselines.registry import make, register
-from usm_gym.files import write_bytes, write_json
+from usm_gym.files import read_bytes, read_json, write_bytes, write_json
 from usm_gym.nominal import Nominal
 from usm_gym.scenario import Mode
-from usm_gym.validation import CONFIG, Count, Number, Positive, in_one_line, require
+from usm_gym.validation import CONFIG, in_one_line, require
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
 RECURRENCE = "recurrence_"  # begins the names of its arrays
+LARGEST_WEIGHTS = 256 * 2**20  # bytes
 PRETRAINED = Path(__file__).with_name("pretrained")
 
 
@@ -42,18 +44,18 @@ class Agent:
         mode: "operation" or "torpedo".
         conditions: Under which it was trained.
         base: Id of the base policy.
-        gains: All gains of the base, by name.
-        residual_scale: Largest residual, N and N m.
+        gains: All gains of the base, by name, -1e12 to 1e12.
+        residual_scale: Largest residual, 1e-6 to 1000 N and N m.
         action: What the action is.
         omit: Entries of the observation that it is not shown.
-        frames: How many observations it sees at once.
+        frames: How many observations it sees at once, 1 to 100.
         layout: Fingerprint of the observation's layout.
         activation: Of the hidden layers.
         output: Of the last layer.
         weights: SHA-256 of the file of weights.
         algorithm: By which it was trained.
-        seed: Seed of the training.
-        steps: After how many steps.
+        seed: Seed of the training, 0 to 4294967295.
+        steps: After how many steps, 0 to 1e12.
         training: Settings, versions and the command of the training.
         scores: Scores, each with where it comes from.
     """
@@ -62,18 +64,18 @@ class Agent:
     mode: Mode
     conditions: dict[str, Any]
     base: str
-    gains: dict[str, Number]
-    residual_scale: Positive
+    gains: dict[str, Gain]
+    residual_scale: ResidualScale
     action: ActionKind
     omit: tuple[str, ...]
-    frames: Count
+    frames: Frames
     layout: str
     activation: Activation
     output: Output
     weights: str
     algorithm: str
-    seed: int
-    steps: int
+    seed: Annotated[int, Strict(), Field(ge=0, le=2**32 - 1)]
+    steps: Annotated[int, Strict(), Field(ge=0, le=10**12)]
     training: dict[str, Any]
     scores: dict[str, Any]
 
@@ -107,30 +109,37 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
         ValueError: If the folder holds no agent, or one that was changed or cut short.
         OSError: If it cannot be read.
     """
-    text, data = (folder / DESCRIPTION).read_bytes(), (folder / WEIGHTS).read_bytes()
     try:
-        agent = _ADAPTER.validate_python(json.loads(text))
+        agent = _ADAPTER.validate_python(read_json(folder / DESCRIPTION, links=False))
     except ValueError as error:
         raise ValueError(f"{folder / DESCRIPTION} is no agent: {in_one_line(error)}") from error
+    data = read_bytes(folder / WEIGHTS, LARGEST_WEIGHTS, links=False)
     found = hashlib.sha256(data).hexdigest()
     require(found == agent.weights, f"SHA-256 of {folder / WEIGHTS}", found, agent.weights)
     try:
-        arrays = load(data)
-        parts = {
-            name.removeprefix(RECURRENCE): arrays.pop(name)
-            for name in list(arrays)
-            if name.startswith(RECURRENCE)
-        }
-        count = len(arrays) // 2
-        return agent, Network(
-            tuple(arrays[f"weight_{k}"] for k in range(count)),
-            tuple(arrays[f"bias_{k}"] for k in range(count)),
-            agent.activation,
-            agent.output,
-            Recurrence(**parts) if parts else None,
-        )
-    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+        return agent, _network(agent, load(data))
+    except KeyError as error:  # a type of numbers, or the name of an array
+        raise ValueError(
+            f"{folder / WEIGHTS} is no network: {error}; allowed: weights and biases, float32"
+        ) from error
+    except (SafetensorError, TypeError, ValueError) as error:
         raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
+
+
+def _network(agent: Agent, arrays: dict[str, NDArray[np.float32]]) -> Network:
+    recurrence = {
+        name.removeprefix(RECURRENCE): array
+        for name, array in arrays.items()
+        if name.startswith(RECURRENCE)
+    }
+    layers = range((len(arrays) - len(recurrence)) // 2)
+    return Network(
+        tuple(arrays[f"weight_{k}"] for k in layers),
+        tuple(arrays[f"bias_{k}"] for k in layers),
+        agent.activation,
+        agent.output,
+        Recurrence(**recurrence) if recurrence else None,
+    )
 
 
 def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import socket
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from typing import Any
 import joblib
 
 from usm_gym.conditions import Conditions, conditions_of
-from usm_gym.files import check_writable
+from usm_gym.files import check_writable, parse_json
 from usm_gym.validation import require
 
 # How long a cluster may take to accept a connection, s.
@@ -87,10 +86,7 @@ def parse_conditions(text: str) -> Conditions:
     """Conditions from a preset's name or a JSON object."""
     if text.lstrip()[:1] not in ("{", "["):
         return conditions_of(text)
-    try:
-        return conditions_of(json.loads(text))
-    except json.JSONDecodeError as error:
-        raise ValueError(f"--conditions is {text!r}: no JSON ({error})") from error
+    return conditions_of(parse_json(text, f"--conditions {text}"))
 
 
 def count(arguments: Any, option: str, default: int, least: int = 1) -> int:

@@ -6,25 +6,30 @@ import dataclasses
 import json
 import shlex
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import Field, Strict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from agents.algorithms import CLASSES
-from agents.residual import RESIDUAL_SCALE, ActionKind
+from agents.residual import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.conditions import FIELD, Conditions
 from usm_gym.files import write_json
 from usm_gym.scenario import Mode, Scenario, sample
-from usm_gym.validation import CONFIG, Count, Positive, in_one_line, require
+from usm_gym.validation import CONFIG, Count, in_one_line, require
 
 PLAN = "plan.json"
 # The scenarios on which an agent is scored in the end, as `usm evaluate` samples them.
 TEST_SEED, TEST_EPISODES = 7, 100
 # Fields of a plan, and of an agent's description, that are arguments of the residual task.
 TASK = ("residual_scale", "action", "omit", "frames")
+
+
+# What numpy's global stream, from which Stable-Baselines3 draws, takes.
+Seed = Annotated[int, Strict(), Field(ge=0, le=2**32 - 1)]
+Steps = Annotated[Count, Field(le=10**12)]
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -35,32 +40,32 @@ class Plan:
         algorithm: "ppo", "recurrent-ppo", "sac", "td3" or "tqc".
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
-        residual_scale: Largest residual, N and N m.
+        residual_scale: Largest residual, 1e-6 to 1000 N and N m.
         action: What the action is: "wrench" or "thrusters".
         omit: Entries of the observation that the agent is not shown.
-        frames: How many observations it sees at once.
+        frames: How many observations it sees at once, 1 to 100.
         conditions: Conditions from which scenarios are sampled.
-        seed: Seed of everything random.
-        steps: Control periods to train on, over all robots.
-        interval: Steps between checkpoints, at each of which the agent is also validated.
+        seed: Seed of everything random, 0 to 4294967295.
+        steps: Control periods to train on, over all robots, 1 to 1e12.
+        interval: Steps between checkpoints, at each of which the agent is also validated, 1 to
+            1e12.
     """
 
     algorithm: str = "ppo"
     env: str = "agents:USM-OperationResidual-v0"
     base: str = "sta"
-    residual_scale: Positive = RESIDUAL_SCALE
+    residual_scale: ResidualScale = RESIDUAL_SCALE
     action: ActionKind = "wrench"
     omit: tuple[str, ...] = ()
-    frames: Count = 1
+    frames: Frames = 1
     conditions: Conditions = FIELD
-    seed: int = 0
-    steps: Count = 3_000_000
-    interval: Count = 250_000
+    seed: Seed = 0
+    steps: Steps = 3_000_000
+    interval: Steps = 250_000
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained."""
         require(self.algorithm in CLASSES, "algorithm", self.algorithm, ", ".join(CLASSES))
-        require(self.seed >= 0, "seed", self.seed, "0 or more")
         known = [id for id in gym.registry if id.endswith("Residual-v0")]
         require(self.env.removeprefix("agents:") in known, "env", self.env, ", ".join(known))
         require(":" not in self.base, "base", self.base, "an id, or an id with a file of gains")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from agents.residual_observation import ResidualObserver
 from baselines.contender import contender
@@ -17,7 +18,7 @@ from usm_gym.nominal import Nominal
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant.compile import compiled
 from usm_gym.plant.thrusters import allocate
-from usm_gym.validation import require
+from usm_gym.validation import Count, Number, is_whole, require
 
 Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -25,6 +26,12 @@ Flags = NDArray[np.bool_]
 ActionKind = Literal["wrench", "thrusters"]
 # The limit of a thruster: less slows learning down, more buys error with chattering.
 RESIDUAL_SCALE = 20.0
+# N and N m: the limit of the strongest thruster that conditions allow.
+LEAST_RESIDUAL, LARGEST_RESIDUAL = 1e-6, 1000.0
+MOST_FRAMES = 100
+
+ResidualScale = Annotated[Number, Field(ge=LEAST_RESIDUAL, le=LARGEST_RESIDUAL)]
+Frames = Annotated[Count, Field(le=MOST_FRAMES)]
 
 
 class Memory(NamedTuple):
@@ -78,18 +85,24 @@ class Residual:
             nominal: What is known of the robot.
             base: The base policy: a name as `--policies` takes it, or the policy itself.
             residual_scale: Largest residual force in each axis or of each thruster, N, and largest
-                residual moment, N m.
+                residual moment, N m; 1e-6 to 1000.
             action: "wrench" or "thrusters".
             omit: Entries of the observation that the agent is not shown, by name.
-            frames: How many observations the agent sees at once, the latest last.
+            frames: How many observations the agent sees at once, the latest last, 1 to 100.
 
         Raises:
             ValueError: If the base is unknown or an argument not allowed.
         """
         kinds = get_args(ActionKind)
         require(action in kinds, "action", action, " or ".join(kinds))
-        number = isinstance(residual_scale, (int, float)) and np.isfinite(residual_scale)
-        require(number and residual_scale > 0, "residual_scale", residual_scale, "a force > 0 N")
+        require(
+            isinstance(residual_scale, (int, float))
+            and LEAST_RESIDUAL <= residual_scale <= LARGEST_RESIDUAL,
+            "residual_scale",
+            residual_scale,
+            f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
+        )
+        require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
         if isinstance(base, str):
             named = contender(base)
             require(not named.privileged, "base", base, "a policy that is not given true state")

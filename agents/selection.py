@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from baselines.registry import entry, ids
 from baselines.scoring import BATCH, TIME_LIMIT, Refusal, Task, score_all, shared_nominal
 from usm_gym.conditions import Conditions
 from usm_gym.evaluation import Evaluation
+from usm_gym.files import read_json
 from usm_gym.robot import Robot
 from usm_gym.scenario import MODES, Mode, Scenario, sample
 from usm_gym.seeding import EVALUATION, stream
@@ -148,10 +148,10 @@ def read_suite(name: str) -> list[Scenario]:
     if not name.endswith(".json"):
         return suite(name)
     try:
-        listed = json.loads(Path(name).read_text(encoding="utf-8"))["scenarios"]
+        listed = read_json(name)["scenarios"]
         require(isinstance(listed, list) and listed, "scenarios", listed, "a list of one or more")
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{name} is no file of scenarios: {error!r}") from error
+        raise ValueError(f"{name} is no file of scenarios: {in_one_line(error)}") from error
     scenarios = []
     for index, data in enumerate(listed):
         try:

@@ -13,6 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from usm_gym.validation import SAID, clipped
+
 
 class Parser(argparse.ArgumentParser):
     """An argument parser that keeps the lines of its texts and says what is wrong in one."""
@@ -24,7 +26,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Leave with status 2."""
-        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+        self.exit(2, f"{self.prog}: error: {clipped(message, SAID)} (see {self.prog} --help)\n")
 
 
 def output_console() -> Console:

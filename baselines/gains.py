@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import TypeAdapter
+from pydantic import Field, TypeAdapter
 
-from usm_gym.validation import Number, in_one_line
+from usm_gym.files import read_json
+from usm_gym.validation import Count, Number, in_one_line
+
+# Of any law, in its own unit.
+Gain = Annotated[Number, Field(ge=-1e12, le=1e12)]
 
 # Shipped gains: ID.json is registered as ID-tuned; those in FRONT were tuned with other weights on
 # thrust variation, and show what a law can do at less or more of it.
@@ -21,12 +25,12 @@ class Budget:
     """What a tuning may cost, the same for every policy that is compared.
 
     Attributes:
-        trials: How many sets of gains are tried.
-        episodes: On how many scenarios.
+        trials: How many sets of gains are tried, 1 to 1e6.
+        episodes: On how many scenarios, 1 to 1e6.
     """
 
-    trials: int
-    episodes: int
+    trials: Annotated[Count, Field(le=1_000_000)]
+    episodes: Annotated[Count, Field(le=1_000_000)]
 
 
 @dataclass(frozen=True)
@@ -35,15 +39,15 @@ class GainsFile:
 
     Attributes:
         policy: Id of the policy.
-        gains: Its gains by name; those not named are the policy's own.
+        gains: Its gains by name, -1e12 to 1e12; those not named are the policy's own.
         budget: What the tuning cost.
-        weight: Cost of thrust variation in the objective, mm per N/s.
+        weight: Cost of thrust variation in the objective, 0 to 1000 mm per N/s.
     """
 
     policy: str
-    gains: dict[str, Number]
+    gains: dict[str, Gain]
     budget: Budget
-    weight: Number
+    weight: Annotated[Number, Field(ge=0, le=1000)]
 
 
 _ADAPTER = TypeAdapter(GainsFile)
@@ -57,6 +61,6 @@ def read_gains(path: str | Path) -> GainsFile:
         OSError: If it cannot be read.
     """
     try:
-        return _ADAPTER.validate_python(json.loads(Path(path).read_text(encoding="utf-8")))
+        return _ADAPTER.validate_python(read_json(path))
     except ValueError as error:
         raise ValueError(f"{path} is no file of gains: {in_one_line(error)}") from error

@@ -7,7 +7,6 @@ Candidates are scored with the implicit laws at a coarser step; the best is chec
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -30,10 +29,11 @@ from baselines.reproduction import (
     laws,
     velocity_start,
 )
-from usm_gym.files import write_json
+from usm_gym.files import read_json, write_json
 from usm_gym.metrics import LOST_ERROR, max_error, settled_error
 from usm_gym.provenance import provenance
 from usm_gym.scenario import Mode, Scenario, named
+from usm_gym.validation import in_one_line
 
 Array = NDArray[np.float64]
 
@@ -222,14 +222,15 @@ def assessed(freedoms: Freedoms) -> dict[str, Any]:
 def stored(path: Path, origin: dict[str, Any]) -> dict[tuple[float, ...], float]:
     """Scores of this commit in the file, by candidate."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         if document["provenance"]["commit"] != origin["commit"]:
             return {}
         return {tuple(x): score for x, score in document["evaluations"]}
     except FileNotFoundError:
         return {}
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is no fit: {error!r}; remove it to start anew") from error
+        reason = in_one_line(error)
+        raise ValueError(f"{path} is no fit: {reason}; remove it to start anew") from error
 
 
 def listed(scores: dict[tuple[float, ...], float]) -> list[Any]:

@@ -22,11 +22,12 @@ from baselines.reproduction import (
     side_by_side,
     velocity_start,
 )
-from usm_gym.files import write_json
+from usm_gym.files import read_json, write_json
 from usm_gym.metrics import max_error, settled_error
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
 from usm_gym.scenario import MODES, Mode, named
+from usm_gym.validation import in_one_line
 
 ROWS = ("sta", "pd")
 # Starts of the sliding variable in both axes, m/s, for the study of the oscillation that remains.
@@ -294,14 +295,15 @@ def cost(case: Case) -> int:
 def stored(path: Path, origin: dict[str, Any]) -> dict[str, Any]:
     """Results of this commit in the file, by key."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
         if document["provenance"]["commit"] != origin["commit"]:
             return {}
         return {key(entry): entry["result"] for entry in document["runs"]}
     except FileNotFoundError:
         return {}
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path} is no study: {error!r}; remove it to start anew") from error
+        reason = in_one_line(error)
+        raise ValueError(f"{path} is no study: {reason}; remove it to start anew") from error
 
 
 def write_study(

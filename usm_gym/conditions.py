@@ -6,13 +6,20 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from usm_gym.robot import Hydrodynamics
-from usm_gym.validation import CONFIG, NonNegative, Number, Positive, Switch, require
+from usm_gym.validation import CONFIG, Number, Switch, build, require
 
-Range = tuple[Number, Number]
+# No water that a robot swims in moves faster, m/s.
+LARGEST_CURRENT = 5.0
+# What a control period costs at most, which nothing can interrupt.
+MOST_SUBSTEPS = 10_000
+
+Coefficient = Annotated[Number, Field(ge=0.01, le=100)]
+Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
+FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -22,48 +29,49 @@ class Conditions:
     The defaults are the preset "field".
 
     Attributes:
-        control_period: Time between two actions, s; a multiple of the physics step.
-        physics_step: Step of the integration, s.
+        control_period: Time between two actions, 1e-6 to 1 s; up to 10000 physics steps.
+        physics_step: Step of the integration, 1e-6 to 0.1 s.
         integrator: "symplectic" treats drag and joint controllers implicitly; "explicit" is Euler's
             forward method, stable with the default joint gains only below about 1e-4 s.
         hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
-        thruster_time_constant: First-order lag of the thrusters, s; 0 for none.
-        thruster_limit: Largest force of a thruster, N, up to 1000.
-        position_noise: Standard deviation of the position measurement in each axis, m.
-        current_limit: Largest constant current in each axis, m/s.
-        current_variation: Largest amplitude of a sinusoidal current on top of it, m/s.
-        coefficient_range: True hydrodynamic coefficients over the nominal ones.
-        deflection_range: Size of the head deflections, rad.
-        filter_range: Natural frequency of the joint references' filter, rad/s.
+        thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
+        thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
+        position_noise: Standard deviation of the position measurement in each axis, 0 to 1 m.
+        current_limit: Largest constant current in each axis, 0 to 5 m/s.
+        current_variation: Largest amplitude of a sinusoidal current on top of it, 0 to 5 m/s.
+        coefficient_range: True hydrodynamic coefficients over the nominal ones, 0.01 to 100.
+        deflection_range: Size of the head deflections, 0.001 to 20 rad.
+        filter_range: Natural frequency of the joint references' filter, 0.01 to 1000 rad/s.
         motion: False keeps the joints still.
     """
 
-    control_period: Positive = 0.02
-    physics_step: Positive = 1e-3
+    control_period: Annotated[Number, Field(ge=1e-6, le=1)] = 0.02
+    physics_step: Annotated[Number, Field(ge=1e-6, le=0.1)] = 1e-3
     integrator: Literal["symplectic", "explicit"] = "symplectic"
     hydrodynamics: Hydrodynamics = "consistent"
-    thruster_time_constant: NonNegative = 0.05
-    thruster_limit: Annotated[Positive, Field(le=1000)] = 20.0
-    position_noise: NonNegative = 5e-5
-    current_limit: NonNegative = 0.05
-    current_variation: NonNegative = 0.0
-    coefficient_range: Range = (0.8, 1.2)
-    deflection_range: Range = (0.7, 1.75)
-    filter_range: Range = (6.0, 12.0)
+    thruster_time_constant: Annotated[Number, Field(ge=0, le=100)] = 0.05
+    thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0
+    position_noise: Annotated[Number, Field(ge=0, le=1)] = 5e-5
+    current_limit: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.05
+    current_variation: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.0
+    coefficient_range: tuple[Coefficient, Coefficient] = (0.8, 1.2)
+    deflection_range: tuple[Deflection, Deflection] = (0.7, 1.75)
+    filter_range: tuple[FilterFrequency, FilterFrequency] = (6.0, 12.0)
     motion: Switch = True
 
     def __post_init__(self) -> None:
         """Refuse a control period that is no multiple of the step, and ranges that are none."""
         multiple = self.control_period / self.physics_step
         require(
-            round(multiple) >= 1 and math.isclose(multiple, round(multiple), rel_tol=1e-9),
+            1 <= round(multiple) <= MOST_SUBSTEPS
+            and math.isclose(multiple, round(multiple), rel_tol=1e-9),
             "control_period",
             self.control_period,
-            f"a multiple of physics_step = {self.physics_step}",
+            f"1 to {MOST_SUBSTEPS} times physics_step = {self.physics_step}",
         )
         for name in ("coefficient_range", "deflection_range", "filter_range"):
             low, high = getattr(self, name)
-            require(0 < low <= high, name, (low, high), "0 < low <= high")
+            require(low <= high, name, (low, high), "low <= high")
 
     @property
     def timing(self) -> tuple[float, float, str, str]:
@@ -100,7 +108,7 @@ PRESETS: dict[str, Conditions] = {
 
 
 def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
-    """Conditions from a preset's name, or from fields that differ from the preset "field".
+    """Give the conditions of a preset's name, or of fields that differ from the preset "field".
 
     Raises:
         ValueError: If the name or a field is unknown, or a value not allowed.
@@ -110,5 +118,7 @@ def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
     if isinstance(value, str):
         require(value in PRESETS, "conditions", value, ", ".join(PRESETS))
         return PRESETS[value]
-    require(isinstance(value, Mapping), "conditions", value, "a preset's name or a dict of fields")
-    return Conditions(**value)
+    return build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
+
+
+_ADAPTER = TypeAdapter(Conditions)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
 from usm_gym.conditions import Conditions, conditions_of
@@ -14,9 +16,9 @@ from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.reward import reward, reward_of_loss
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Mode, Scenario, named, sample
+from usm_gym.scenario import Mode, Scenario, mode_of, named, sample
 from usm_gym.simulation import Simulation, Snapshot
-from usm_gym.validation import require
+from usm_gym.validation import brief, is_whole, require
 from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observation = NDArray[np.float32]
@@ -111,7 +113,7 @@ window shows every step in real time (drawing needs the extra `render`) |
         Raises:
             ValueError: If a condition, a field of the robot or the render mode is not allowed.
         """
-        self.mode = mode
+        self.mode: Mode = mode_of(mode)
         self.conditions = conditions_of(conditions)
         self.robot = robot_of(robot)
         self.render_mode = render_mode
@@ -147,11 +149,16 @@ window shows every step in real time (drawing needs the extra `render`) |
         """Start an episode; see the class for `options`.
 
         Raises:
-            ValueError: If an option or a scenario is unknown or not valid.
+            ValueError: If the seed, an option or a scenario is unknown or not valid; the
+                environment is then left as it was.
         """
-        super().reset(seed=seed)
-        scenario = scenario_of(options, self.mode, self.conditions, self.robot, self.np_random)
+        seed = checked_seed(seed)
+        # A copy of the stream, so that a reset that is refused leaves everything as it was.
+        stream = copy.deepcopy(self.np_random) if seed is None else seeding.np_random(seed)[0]
+        scenario = scenario_of(options, self.mode, self.conditions, self.robot, stream)
         self._simulation = Simulation(self.robot, [scenario])
+        super().reset(seed=seed)
+        self.np_random.bit_generator.state = stream.bit_generator.state
         self._over = False
         if self._viewer is not None:
             self._viewer.follow(self._simulation)
@@ -236,10 +243,34 @@ def action_space(robot: Robot) -> gym.Space[NDArray[np.float32]]:
 
 def checked_action(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """The action as float32 in [-1, 1], or an error that says what is wrong with it."""
-    array = np.asarray(action, np.float32)
-    require(array.shape == shape, "the action's shape", array.shape, f"{shape}")
+    array = saturated(action, shape)
     require(not np.isnan(array).any(), "action", action, "numbers, not NaN")
-    return np.clip(array, -1.0, 1.0)
+    return array
+
+
+def saturated(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """The action as float32 in [-1, 1]; a NaN stays one.
+
+    Raises:
+        ValueError: If it is no array of real numbers of that shape.
+    """
+    try:
+        array = np.asarray(action)
+    except Exception as error:  # whatever an object does that shall become an array
+        raise ValueError(f"action is {brief(action)}; allowed: an array of numbers") from error
+    require(array.dtype.kind in "fiub", "action", action, "an array of real numbers")
+    require(array.shape == shape, "the action's shape", array.shape, f"{shape}")
+    return np.asarray(np.clip(array, -1.0, 1.0), np.float32)
+
+
+def checked_seed(seed: Any) -> int | None:
+    """A seed as Python's integer, or None where there is none.
+
+    Raises:
+        ValueError: If it is neither.
+    """
+    require(seed is None or is_whole(seed, 0), "seed", seed, "None or an integer from 0 on")
+    return None if seed is None else int(seed)
 
 
 def scenario_of(
@@ -250,9 +281,9 @@ def scenario_of(
     stream: np.random.Generator,
 ) -> Scenario:
     """The scenario that reset options ask for; without any, one drawn from the stream."""
-    options = options or {}
-    unknown = sorted(set(options) - {"scenario"})
-    require(not unknown, "options", unknown, "scenario")
+    options = {} if options is None else options
+    known = isinstance(options, Mapping) and set(options) <= {"scenario"}
+    require(known, "options", options, "a dict with the key scenario")
     wanted = options.get("scenario")
     if wanted is None:
         return sample(mode, conditions, stream, robot.links - 1)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym import metrics, parallel
+from usm_gym.env import saturated
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
@@ -226,17 +227,11 @@ def _run(
             "a pair (action, state)",
         )
         state = answer[1]
-        action = np.asarray(answer[0], np.float32)
-        require(
-            action.shape == (size, thrusters),
-            "the shape of the policy's action",
-            action.shape,
-            f"({size}, {thrusters})",
-        )
+        action = saturated(answer[0], (size, thrusters))
         alive = (k < ends) & ~lost
         missing = np.isnan(action)
         require(not missing[alive].any(), "the policy's action", "NaN", "numbers")
-        simulation.step(np.clip(np.where(missing, 0.0, action), -1.0, 1.0))
+        simulation.step(np.where(missing, np.float32(0.0), action))
         watch(simulation)
         error[k], heading[k] = simulation.error, simulation.heading_error
         command[k] = simulation.command

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, Strict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from usm_gym.validation import CONFIG, Count, NonNegative, Positive, require
+from usm_gym.validation import CONFIG, Count, Number, build, require
 
 Direction = Literal["axial", "normal"]
+# Of the joint controllers; a scenario may bring its own.
+Stiffness = Annotated[Number, Field(ge=0, le=1e6)]
+Damping = Annotated[Number, Field(ge=0, le=1e6)]
 # Forms of the added mass, docs/model.md section 3.
 Hydrodynamics = Literal["consistent", "kelasidi2014"]
 
@@ -22,12 +26,12 @@ class Thruster:
     """A thruster at the centre of a link, pushing along the link or across it.
 
     Attributes:
-        link: Number of the link that carries it, 1 = tail.
+        link: Number of the link that carries it, 1 = tail, up to 256.
         direction: "axial" pushes along the link's tangent (towards the head for a positive
             force), "normal" along its normal, a quarter turn anticlockwise from the tangent.
     """
 
-    link: Count
+    link: Annotated[Count, Field(le=256)]
     direction: Direction
 
 
@@ -51,38 +55,37 @@ class Robot:
     and `linear_yaw_drag` that do not match their formulas; the published values are kept.
 
     Attributes:
-        links: Number of links, 2 or more.
-        link_length: Length of one link, 2l, m.
-        link_mass: Mass of one link, kg; the default makes it neutrally buoyant.
-        half_height: Semi-axis a of the elliptic section, m.
-        half_width: Semi-axis b of the elliptic section, m.
-        water_density: Density of the water, kg/m^3.
-        friction_coefficient: C_f, skin friction, dimensionless.
-        drag_coefficient: C_D, cross-flow drag, dimensionless.
-        added_mass_coefficient: C_A, dimensionless.
-        added_inertia_coefficient: C_M, dimensionless.
-        joint_stiffness: Proportional gain of the joint controllers, N m/rad.
-        joint_damping: Derivative gain of the joint controllers, N m s/rad.
-        thrusters: The thrusters in the order of every thruster vector.
+        links: Number of links, 2 to 256.
+        link_length: Length of one link, 2l, 0.01 to 10 m.
+        link_mass: Mass of one link, 0.001 to 10000 kg; the default makes it neutrally buoyant.
+        half_height: Semi-axis a of the elliptic section, 0.001 to 10 m.
+        half_width: Semi-axis b of the elliptic section, 0.001 to 10 m.
+        water_density: Density of the water, 0.001 to 10000 kg/m^3.
+        friction_coefficient: C_f, skin friction, dimensionless, 0 to 100.
+        drag_coefficient: C_D, cross-flow drag, dimensionless, 0 to 100.
+        added_mass_coefficient: C_A, dimensionless, 0 to 100.
+        added_inertia_coefficient: C_M, dimensionless, 0 to 100.
+        joint_stiffness: Proportional gain of the joint controllers, 0 to 1e6 N m/rad.
+        joint_damping: Derivative gain of the joint controllers, 0 to 1e6 N m s/rad.
+        thrusters: The 3 to 64 thrusters in the order of every thruster vector.
     """
 
-    links: Count = 16
-    link_length: Positive = 0.14
-    link_mass: Positive = 0.6597
-    half_height: Positive = 0.03
-    half_width: Positive = 0.05
-    water_density: Positive = 1000.0
-    friction_coefficient: NonNegative = 0.03
-    drag_coefficient: NonNegative = 2.0
-    added_mass_coefficient: NonNegative = 1.0
-    added_inertia_coefficient: NonNegative = 1.0
-    joint_stiffness: NonNegative = 20.0
-    joint_damping: NonNegative = 5.0
-    thrusters: tuple[Thruster, ...] = PAPER_THRUSTERS
+    links: Annotated[int, Strict(), Field(ge=2, le=256)] = 16
+    link_length: Annotated[Number, Field(ge=0.01, le=10)] = 0.14
+    link_mass: Annotated[Number, Field(ge=1e-3, le=1e4)] = 0.6597
+    half_height: Annotated[Number, Field(ge=1e-3, le=10)] = 0.03
+    half_width: Annotated[Number, Field(ge=1e-3, le=10)] = 0.05
+    water_density: Annotated[Number, Field(ge=1e-3, le=1e4)] = 1000.0
+    friction_coefficient: Annotated[Number, Field(ge=0, le=100)] = 0.03
+    drag_coefficient: Annotated[Number, Field(ge=0, le=100)] = 2.0
+    added_mass_coefficient: Annotated[Number, Field(ge=0, le=100)] = 1.0
+    added_inertia_coefficient: Annotated[Number, Field(ge=0, le=100)] = 1.0
+    joint_stiffness: Stiffness = 20.0
+    joint_damping: Damping = 5.0
+    thrusters: Annotated[tuple[Thruster, ...], Field(min_length=3, max_length=64)] = PAPER_THRUSTERS
 
     def __post_init__(self) -> None:
-        """Refuse a single link and a layout that leaves a planar wrench out of reach."""
-        require(self.links >= 2, "links", self.links, "2 or more")
+        """Refuse a layout that leaves a planar wrench out of reach."""
         for thruster in self.thrusters:
             require(thruster.link <= self.links, "thrusters", thruster, f"links 1 to {self.links}")
         require(
@@ -213,13 +216,14 @@ class Robot:
 
 
 def robot_of(value: Mapping[str, Any] | Robot | None) -> Robot:
-    """A robot from the fields that differ from the paper's.
+    """Make a robot from the fields that differ from the paper's.
 
     Raises:
         ValueError: If a field is unknown or its value not allowed.
     """
     if isinstance(value, Robot):
         return value
-    fields = {} if value is None else value
-    require(isinstance(fields, Mapping), "robot", value, "a Robot or a dict of its fields")
-    return Robot(**fields)
+    return build(_ADAPTER, "robot", {} if value is None else value)
+
+
+_ADAPTER = TypeAdapter(Robot)

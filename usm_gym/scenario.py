@@ -15,13 +15,27 @@ import numpy as np
 from pydantic import Field, Strict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from usm_gym.conditions import FIELD, PRESETS, Conditions
+from usm_gym.conditions import (
+    FIELD,
+    LARGEST_CURRENT,
+    PRESETS,
+    Coefficient,
+    Conditions,
+    FilterFrequency,
+)
 from usm_gym.plant.layout import MAX_SHIFTS
 from usm_gym.plant.motion import path_positions
-from usm_gym.validation import CONFIG, Count, NonNegative, Number, Positive, Switch, require
+from usm_gym.robot import Damping, Stiffness
+from usm_gym.validation import CONFIG, Count, Number, Switch, build, require
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
+# The longest episode; at the paper's step of 1e-5 s these are 200 s.
+MOST_PHYSICS_STEPS = 20_000_000
+
+Time = Annotated[Number, Field(ge=0, le=3600)]
+Velocity = Annotated[Number, Field(ge=-LARGEST_CURRENT, le=LARGEST_CURRENT)]
+Phase = Annotated[Number, Field(ge=-100, le=100)]
 
 # Spawn keys of the streams that a noise seed opens.
 NOISE, WATER = range(2)
@@ -32,16 +46,16 @@ class Path:
     """The path of the centre of mass, p_ref = (speed s, amplitude sin(frequency s)).
 
     Attributes:
-        speed: v, m/s.
-        amplitude: A, m.
-        frequency: Angular frequency, rad/s.
-        ramp: Time over which path time s starts from rest, s; 0 starts at full speed.
+        speed: v, -10 to 10 m/s.
+        amplitude: A, -100 to 100 m.
+        frequency: Angular frequency, -100 to 100 rad/s.
+        ramp: Time over which path time s starts from rest, 0 (at full speed) to 3600 s.
     """
 
-    speed: Number = 0.042
-    amplitude: Number = 0.18
-    frequency: Number = 0.065
-    ramp: NonNegative = 2.0
+    speed: Annotated[Number, Field(ge=-10, le=10)] = 0.042
+    amplitude: Annotated[Number, Field(ge=-100, le=100)] = 0.18
+    frequency: Annotated[Number, Field(ge=-100, le=100)] = 0.065
+    ramp: Time = 2.0
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -52,25 +66,25 @@ class Inspection:
     the head to -d.
 
     Attributes:
-        bending_joints: How many joints bend, counted from the head.
-        times: When the deflection changes, s, rising.
-        deflections: To what it changes at those times, rad.
+        bending_joints: How many joints bend, counted from the head, 1 to 255.
+        times: When the deflection changes, up to 8 rising times, 0 to 3600 s.
+        deflections: To what it changes at those times, -100 to 100 rad.
         filter_frequency: Natural frequency of the critically damped second-order filter between
-            those steps and the joint references, rad/s; None leaves them steps.
+            those steps and the joint references, 0.01 to 1000 rad/s; None leaves them steps.
     """
 
-    bending_joints: Count = 11
-    times: tuple[NonNegative, ...] = (10.0, 20.0, 30.0)
-    deflections: tuple[Number, ...] = (0.98, -0.98, 0.0)
-    filter_frequency: Positive | None = 8.0
+    bending_joints: Annotated[Count, Field(le=255)] = 11
+    times: Annotated[tuple[Time, ...], Field(max_length=MAX_SHIFTS)] = (10.0, 20.0, 30.0)
+    deflections: tuple[Annotated[Number, Field(ge=-100, le=100)], ...] = (0.98, -0.98, 0.0)
+    filter_frequency: FilterFrequency | None = 8.0
 
     def __post_init__(self) -> None:
         """Refuse times that do not rise or do not match the deflections."""
         require(
-            len(self.times) == len(self.deflections) <= MAX_SHIFTS,
+            len(self.times) == len(self.deflections),
             "deflections",
             self.deflections,
-            f"as many as times, {MAX_SHIFTS} at most",
+            "as many as times",
         )
         rising = all(a < b for a, b in zip(self.times, self.times[1:], strict=False))
         require(rising, "times", self.times, "rising times")
@@ -84,19 +98,21 @@ class Water:
     """The water of one episode, which no controller is told.
 
     Attributes:
-        current: Constant part of the water's velocity, global frame, m/s.
-        amplitude: Amplitude of its sinusoidal part in each axis, m/s.
-        phase: Phase of that part at the start, rad.
-        period: Period of that part, s.
+        current: Constant part of the water's velocity, global frame, -5 to 5 m/s.
+        amplitude: Amplitude of its sinusoidal part in each axis, -5 to 5 m/s.
+        phase: Phase of that part at the start, -100 to 100 rad.
+        period: Period of that part, 0.1 to 1e6 s.
         coefficients: True over nominal value of (c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the
-            same for all links.
+            same for all links, 0.01 to 100.
     """
 
-    current: tuple[Number, Number] = (0.0, 0.0)
-    amplitude: tuple[Number, Number] = (0.0, 0.0)
-    phase: tuple[Number, Number] = (0.0, 0.0)
-    period: Positive = 20.0
-    coefficients: tuple[Positive, Positive, Positive, Positive, Positive, Positive] = (1.0,) * 6
+    current: tuple[Velocity, Velocity] = (0.0, 0.0)
+    amplitude: tuple[Velocity, Velocity] = (0.0, 0.0)
+    phase: tuple[Phase, Phase] = (0.0, 0.0)
+    period: Annotated[Number, Field(ge=0.1, le=1e6)] = 20.0
+    coefficients: tuple[
+        Coefficient, Coefficient, Coefficient, Coefficient, Coefficient, Coefficient
+    ] = (1.0,) * 6
 
 
 @dataclass(frozen=True, config=CONFIG)
@@ -109,13 +125,15 @@ class Scenario:
         inspection: Joint motion.
         conditions: Sensors, actuators, timing.
         water: The water of this episode.
-        duration: Length of the episode, s; a multiple of the control period.
-        settle_time: From when on errors count, s.
-        noise_seed: Seed of the sensor noise.
-        joint_stiffness: Joint controllers' proportional gain, N m/rad; None: the robot's.
-        joint_damping: Joint controllers' derivative gain, N m s/rad; None: the robot's.
+        duration: Length of the episode, 1e-6 to 3600 s; a multiple of the control period, and
+            20 million physics steps at most.
+        settle_time: From when on errors count, 0 to 3600 s.
+        noise_seed: Seed of the sensor noise, 0 to 2^64 - 1.
+        joint_stiffness: Joint controllers' proportional gain, 0 to 1e6 N m/rad; None: the robot's.
+        joint_damping: Joint controllers' derivative gain, 0 to 1e6 N m s/rad; None: the robot's.
         heading: Whether heading means the mean link angle or the head link's.
-        look_ahead: Look-ahead distance of the line-of-sight guidance, m; None: heading reference 0.
+        look_ahead: Look-ahead distance of the line-of-sight guidance, 0.01 to 1000 m; None: heading
+            reference 0.
         cross_track: Whether that guidance aims at the path, rather than at the x axis as the paper
             prints it.
     """
@@ -125,23 +143,30 @@ class Scenario:
     inspection: Inspection = Inspection()
     conditions: Conditions = FIELD
     water: Water = Water()
-    duration: Positive = 40.0
-    settle_time: NonNegative = 5.0
-    noise_seed: Annotated[int, Strict(), Field(ge=0)] = 0
-    joint_stiffness: NonNegative | None = None
-    joint_damping: NonNegative | None = None
+    duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0
+    settle_time: Time = 5.0
+    noise_seed: Annotated[int, Strict(), Field(ge=0, lt=2**64)] = 0
+    joint_stiffness: Stiffness | None = None
+    joint_damping: Damping | None = None
     heading: Literal["mean", "head"] = "mean"
-    look_ahead: Positive | None = None
+    look_ahead: Annotated[Number, Field(ge=0.01, le=1000)] | None = None
     cross_track: Switch = False
 
     def __post_init__(self) -> None:
-        """Refuse a duration of no whole number of control periods."""
+        """Refuse a duration of no whole number of control periods, or of too many steps."""
         steps = self.duration / self.conditions.control_period
         require(
             round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),
             "duration",
             self.duration,
             f"a multiple of control_period = {self.conditions.control_period}",
+        )
+        longest = MOST_PHYSICS_STEPS * self.conditions.physics_step
+        require(
+            self.duration <= longest,
+            "duration",
+            self.duration,
+            f"up to {longest:g} s, {MOST_PHYSICS_STEPS} physics steps",
         )
 
     @property
@@ -191,8 +216,7 @@ class Scenario:
         Raises:
             ValueError: If a key is unknown, or a value of the wrong type or out of range.
         """
-        require(isinstance(data, Mapping), "scenario", data, "a dict of fields")
-        return _ADAPTER.validate_python(dict(data))
+        return build(_ADAPTER, "scenario", data)
 
 
 _ADAPTER = TypeAdapter(Scenario)
@@ -219,6 +243,17 @@ def draw_water(conditions: Conditions, noise_seed: int) -> Water:
     )
 
 
+def mode_of(value: Any) -> Mode:
+    """The mode of a name.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
+    mode: Mode = value
+    return mode
+
+
 def sample(
     mode: Mode, conditions: Conditions, stream: np.random.Generator, joints: int = 15
 ) -> Scenario:
@@ -230,8 +265,7 @@ def sample(
         stream: Where all randomness comes from.
         joints: Number of joints of the robot; a third to eleven fifteenths of them bend.
     """
-    require(mode in MODES, "mode", mode, " or ".join(MODES))
-    if mode == "torpedo":
+    if mode_of(mode) == "torpedo":
         path = Path(
             speed=stream.uniform(0.05, 0.3),
             amplitude=stream.uniform(0.0, 0.5),

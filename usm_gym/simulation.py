@@ -22,6 +22,9 @@ from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.validation import require
 
+# Physics steps times links of the longest episode: ten minutes of computing or so.
+MOST_LINK_STEPS = 2_000_000_000
+
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -34,6 +37,29 @@ class Snapshot:
 
     scenarios: tuple[Scenario, ...]
     arrays: dict[str, NDArray[Any]]
+
+
+def check_fit(robot: Robot, scenario: Scenario) -> None:
+    """Refuse a scenario that a robot cannot swim.
+
+    Raises:
+        ValueError: If more joints shall bend than it has, or the episode is too much work.
+    """
+    joints = robot.links - 1
+    require(
+        scenario.inspection.bending_joints <= joints,
+        "bending_joints",
+        scenario.inspection.bending_joints,
+        f"1 to {joints}, the robot's joints",
+    )
+    steps = scenario.steps * scenario.conditions.substeps
+    longest = MOST_LINK_STEPS // robot.links * scenario.conditions.physics_step
+    require(
+        steps * robot.links <= MOST_LINK_STEPS,
+        "duration",
+        scenario.duration,
+        f"up to {longest:g} s for {robot.links} links at this physics step",
+    )
 
 
 class Simulation:
@@ -95,6 +121,10 @@ class Simulation:
         for index, scenario in enumerate(scenarios):
             self.start(index, scenario)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._share_out()  # what was one array before pickling has become two
+
     @property
     def limit(self) -> NDArray[np.float64]:
         """Thruster limits, N, (size,)."""
@@ -128,23 +158,13 @@ class Simulation:
         """True position of the centre of mass, m, (size, 2)."""
         return np.stack([self._column(rows.P_X), self._column(rows.P_Y)], axis=1)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._share_out()  # what was one array before pickling has become two
-
-    def start(self, index: int, scenario: Scenario) -> None:
-        """Put one robot at the beginning of a scenario.
+    def check(self, scenario: Scenario) -> None:
+        """Refuse a scenario that `start` would refuse.
 
         Raises:
             ValueError: If the scenario does not fit the robot or the others' timing.
         """
-        joints = self.robot.links - 1
-        require(
-            scenario.inspection.bending_joints <= joints,
-            "bending_joints",
-            scenario.inspection.bending_joints,
-            f"1 to {joints}, the robot's joints",
-        )
+        check_fit(self.robot, scenario)
         require(
             scenario.conditions.timing == self._timing,
             "conditions",
@@ -152,6 +172,14 @@ class Simulation:
             f"control period, physics step, integrator and hydrodynamics as the others: "
             f"{self._timing}",
         )
+
+    def start(self, index: int, scenario: Scenario) -> None:
+        """Put one robot at the beginning of a scenario.
+
+        Raises:
+            ValueError: If the scenario does not fit the robot or the others' timing.
+        """
+        self.check(scenario)
         self.scenarios[index] = scenario
         self._write(index, scenario)
         self.count[index] = 0

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import reprlib
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
 
-from pydantic import ConfigDict, Field, Strict, ValidationError
+import numpy as np
+from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+
+T = TypeVar("T")
 
 CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -40,6 +44,33 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
         raise ValueError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
 
 
+def is_whole(value: object, low: int, high: int | None = None) -> bool:
+    """Whether a value is an integer, and no truth value, from `low` to `high`."""
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
+        return False
+    return bool(low <= value and (high is None or value <= high))
+
+
+def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dict of fields") -> T:
+    """Make an object of a validated type from a dict of its fields.
+
+    Args:
+        adapter: The type.
+        name: Name of the argument that the dict was given for.
+        fields: Values by name; those left out have their defaults.
+        allowed: What would have been accepted, in words.
+
+    Raises:
+        ValueError: If it is no dict, a field is unknown, or a value not allowed.
+    """
+    named = isinstance(fields, Mapping) and all(isinstance(field, str) for field in fields)
+    require(named, name, fields, allowed)
+    try:
+        return adapter.validate_python(dict(fields))
+    except ValidationError as error:
+        raise ValueError(in_one_line(error)) from error
+
+
 def brief(value: object) -> str:
     """Quote a value in one line of at most `QUOTED` characters, however large or odd it is."""
     try:
@@ -62,7 +93,10 @@ def in_one_line(error: BaseException) -> str:
     if isinstance(error, ValidationError):
         return _faults(error)
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        return f"{error.strerror}: {brief(str(error.filename))}"
+        # Paths are long, and a path without its middle is of little use.
+        return f"{error.strerror}: {clipped(str(error.filename), 3 * QUOTED)}"
+    if isinstance(error, KeyError) and error.args:
+        return f"{brief(error.args[0])} is missing"
     return clipped(str(error), SAID)
 
 
@@ -76,4 +110,6 @@ def _fault(fault: Any) -> str:
     if fault["type"] == "value_error":  # one of ours, complete in itself
         return clipped(fault["msg"].removeprefix("Value error, "), SAID)
     field = clipped(".".join(str(part) for part in fault["loc"]))
+    if fault["type"] == "missing":
+        return f"{field} is missing"
     return f"{field} is {brief(fault['input'])}: {fault['msg']}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,17 +15,28 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from usm_gym.conditions import Conditions, conditions_of
-from usm_gym.env import action_space, checked_action, infos, outcome, render_fps, scenario_of
+from usm_gym.env import (
+    action_space,
+    checked_action,
+    checked_seed,
+    infos,
+    outcome,
+    render_fps,
+    scenario_of,
+)
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot, robot_of
-from usm_gym.scenario import Mode, Scenario, named
+from usm_gym.scenario import Mode, Scenario, mode_of, named
 from usm_gym.simulation import Simulation, Snapshot
-from usm_gym.validation import require
+from usm_gym.validation import is_whole, require
 from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+
+# Of the paper's robot, so many take half a gigabyte.
+MOST_ROBOTS = 100_000
 
 
 @dataclass(frozen=True)
@@ -83,20 +95,24 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         Raises:
             ValueError: If an argument is not allowed.
         """
-        require(isinstance(num_envs, int) and num_envs >= 1, "num_envs", num_envs, "1 or more")
-        require(isinstance(threads, int) and threads >= 1, "threads", threads, "1 or more")
+        allowed = f"1 to {MOST_ROBOTS}"
+        require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)
+        require(is_whole(threads, 1), "threads", threads, "1 or more")
         require(
-            isinstance(render_index, int) and 0 <= render_index < num_envs,
+            is_whole(render_index, 0, num_envs - 1),
             "render_index",
             render_index,
             f"0 to {num_envs - 1}",
         )
         self.num_envs = num_envs
-        self.mode = mode
+        self.mode: Mode = mode_of(mode)
         self.conditions = conditions_of(conditions)
         self.robot = robot_of(robot)
         self.threads = threads
         self.render_mode = render_mode
+        modes = [each.value for each in AutoresetMode]
+        known = isinstance(autoreset_mode, AutoresetMode) or autoreset_mode in modes
+        require(known, "autoreset_mode", autoreset_mode, ", ".join(modes))
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {
             "render_modes": list(RENDER_MODES),
@@ -137,19 +153,25 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         """Start the episodes of all robots, or of those in `options["reset_mask"]`.
 
         Raises:
-            ValueError: If a seed, an option or a scenario is not valid.
+            ValueError: If a seed, an option or a scenario is not valid; the environment is then
+                left as it was.
         """
+        valid = options is None or isinstance(options, Mapping)
+        require(valid, "options", options, "a dict with the keys scenario and reset_mask")
         options = dict(options or {})
         which = self._mask(options.pop("reset_mask", None))
-        self._seed(seed, which)
+        streams = self._seeded(seed, which)
         indices = np.flatnonzero(which).tolist()
-        scenarios = {i: self._draw(i, self._options_of(i, options)) for i in indices}
+        scenarios = {i: self._draw(streams[i], self._options_of(i, options)) for i in indices}
         if which.all():
             ordered = [scenarios[i] for i in indices]
             self._simulation = Simulation(self.robot, ordered, self.threads)
         else:
+            for scenario in scenarios.values():
+                self.simulation.check(scenario)
             for index, scenario in scenarios.items():
                 self.simulation.start(index, scenario)
+        self._streams = streams
         self._done[which] = False
         self._follow()
         return self.simulation.observation.copy(), self._infos(which)
@@ -220,28 +242,33 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
 
     def _restart(self, which: Flags) -> None:
         for index in np.flatnonzero(which).tolist():
-            self.simulation.start(index, self._draw(index, {}))
+            self.simulation.start(index, self._draw(self._streams[index], {}))
 
-    def _draw(self, index: int, options: Mapping[str, Any]) -> Scenario:
-        stream = self._streams[index]
+    def _draw(self, stream: np.random.Generator, options: Mapping[str, Any]) -> Scenario:
         return scenario_of(options, self.mode, self.conditions, self.robot, stream)
 
-    def _seed(self, seed: int | Sequence[int | None] | None, which: Flags) -> None:
-        seeds: Sequence[int | None]
-        if seed is None:
-            seeds = [None] * self.num_envs
-        elif isinstance(seed, (int, np.integer)):
-            seeds = [int(seed) + i for i in range(self.num_envs)]
-        else:
-            seeds = list(seed)
-            require(len(seeds) == self.num_envs, "seed", seed, f"{self.num_envs} seeds")
+    def _seeded(
+        self, seed: int | Sequence[int | None] | None, which: Flags
+    ) -> list[np.random.Generator]:
+        """The streams of all robots after a reset of some of them; those in use stay untouched."""
+        seeds = self._seeds(seed)
         if not self._streams:
             require(which.all(), "reset_mask", which, "all robots at the first reset")
-            self._streams = [seeding.np_random(each)[0] for each in seeds]
-            return
+            return [seeding.np_random(each)[0] for each in seeds]
+        streams = list(self._streams)
         for index in np.flatnonzero(which).tolist():
-            if seeds[index] is not None:
-                self._streams[index] = seeding.np_random(seeds[index])[0]
+            again = seeds[index] is None
+            streams[index] = (
+                copy.deepcopy(streams[index]) if again else seeding.np_random(seeds[index])[0]
+            )
+        return streams
+
+    def _seeds(self, seed: Any) -> list[int | None]:
+        if isinstance(seed, (list, tuple)) or (isinstance(seed, np.ndarray) and seed.ndim):
+            require(len(seed) == self.num_envs, "seed", seed, f"{self.num_envs} seeds")
+            return [checked_seed(each) for each in seed]
+        first = checked_seed(seed)
+        return [None if first is None else first + i for i in range(self.num_envs)]
 
     def _mask(self, mask: Any) -> Flags:
         if mask is None:

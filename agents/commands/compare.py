@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from agents.selection import (
@@ -22,11 +20,11 @@ from agents.selection import (
     tasks,
 )
 from agents.terminal import mm, output_console
-from usm_gym.files import check_writable, write_json
+from usm_gym.files import check_writable, read_json, write_json
 from usm_gym.provenance import provenance
 from usm_gym.scenario import Scenario
 from usm_gym.statistics import Comparison, compare
-from usm_gym.validation import require
+from usm_gym.validation import in_one_line, require
 
 DESCRIPTION = """\
 Compare two policies episode by episode, on the same scenarios and noise. Printed are the mean
@@ -124,14 +122,14 @@ def read_results(name: str) -> Results:
     """Read FILE.json or FILE.json:POLICY, as `usm evaluate` has written it."""
     path, _, policy = name.partition(":")
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
+        document = read_json(path)
         results: dict[str, Any] = document["results"]
         scenarios = [Scenario.from_dict(each) for each in document["scenarios"]]
         scores = {
             id: {key: row["per_episode"][key] for key in SCORES} for id, row in results.items()
         }
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"{path} is no file of results: {error!r}") from error
+        raise ValueError(f"{path} is no file of results: {in_one_line(error)}") from error
     several = ", ".join(f"{path}:{id}" for id in results)
     require(policy or len(results) == 1, "results", name, several)
     require(not policy or policy in results, "results", name, several)

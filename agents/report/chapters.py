@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,13 +21,14 @@ from agents.report.tables import (
     score_table,
 )
 from agents.report.words import PAPERS, in_words, motion, total, verdict
-from agents.selection import named, unseen
+from agents.selection import unseen
 from agents.terminal import figures
-from baselines.contender import Contender
+from baselines.contender import Contender, contender
 from baselines.leaderboard import MAIN, suites
 from baselines.registry import entry, ids
 from baselines.reproduction import cases, run_case, side_by_side
 from usm_gym.conditions import FIELD
+from usm_gym.files import read_json
 from usm_gym.scenario import Scenario
 from usm_gym.validation import in_one_line, require
 
@@ -68,12 +68,9 @@ def read(path: Path) -> Document:
         ValueError: If it is none, or of no kind that has a chapter.
         OSError: If it cannot be read.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"{path} is no JSON: {error}") from error
+    document = read_json(path)
     kind = document.get("kind") if isinstance(document, dict) else None
-    require(kind in KINDS, f"kind of {path}", kind, ", ".join(KINDS))
+    require(isinstance(kind, str) and kind in KINDS, f"kind of {path}", kind, ", ".join(KINDS))
     found: Document = document
     return found
 
@@ -95,7 +92,8 @@ def chapter(path: Path, choice: Choice, progress: Progress) -> Chapter:
     try:
         return KINDS[kind](document, choice, progress)
     except (KeyError, TypeError, AttributeError, IndexError) as error:
-        raise ValueError(f"{path} is no complete {kind}: {error!r}") from error
+        fault = f"{type(error).__name__}: {in_one_line(error)}"
+        raise ValueError(f"{path} is no complete {kind}: {fault}") from error
 
 
 def evaluation(result: Document, choice: Choice, progress: Progress) -> Chapter:
@@ -312,20 +310,14 @@ def replay(
 def able(rows: Mapping[str, Row], choice: Choice) -> tuple[list[Contender], dict[str, str]]:
     """The policies to be replayed, and why others are not.
 
-    Code that a file names is not run, unless the user names it, too.
+    A file of results is given nothing to open or to run: of the names in it only those of
+    registered policies mean anything, unless the user gives the name, too.
     """
     if choice.policies is not None:
         return list(choice.policies), {}
-    found, missing = [], {}
-    for name in rows:
-        if ":" in name:
-            missing[name] = f"code of one's own runs only if asked for, --policies {name}"
-            continue
-        try:
-            found.append(named(name))
-        except (ValueError, OSError) as error:
-            missing[name] = in_one_line(error)
-    return found, missing
+    known = [name for name in rows if name in ids()]
+    why = "only registered policies are replayed unasked; name others with --policies"
+    return [contender(name) for name in known], {name: why for name in rows if name not in known}
 
 
 def names() -> Facts:

@@ -1,6 +1,7 @@
 """Files of agents: read back to the bit, and refused when anything about them is wrong."""
 
 import json
+import os
 import pickle
 import sys
 from hashlib import sha256
@@ -16,6 +17,7 @@ from agents.network import Network
 from agents.residual import Residual, ResidualPolicy
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
+from usm_gym.validation import SAID
 
 SUITE = usm_gym.suite("operation")[:2]
 NOMINAL = nominal_of(Robot(), SUITE[0])
@@ -109,6 +111,27 @@ def cut_short(folder):
     (folder / DESCRIPTION).write_text(text[: len(text) // 2])
 
 
+def linked(folder):
+    secret = folder.parent / "token"
+    secret.write_text('{"summary": "secret"}')
+    (folder / DESCRIPTION).unlink()
+    (folder / DESCRIPTION).symlink_to(secret)
+
+
+def piped(folder):
+    (folder / WEIGHTS).unlink()
+    os.mkfifo(folder / WEIGHTS)
+
+
+def nested(folder):
+    (folder / DESCRIPTION).write_text("[" * 200_000)
+
+
+def in_bfloat16(folder):
+    header = b'{"weight_0":{"dtype":"BF16","shape":[1],"data_offsets":[0,2]}}'
+    with_weights(folder, len(header).to_bytes(8, "little") + header + b"\0\0")
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
@@ -117,6 +140,13 @@ def cut_short(folder):
         (poisoned, "is no network"),
         (lost, WEIGHTS),
         (cut_short, "is no agent"),
+        (linked, "a symbolic link"),
+        (piped, "a regular file"),
+        (nested, "nested too deeply"),
+        (in_bfloat16, "'BF16'; allowed: .* float32"),
+        (lambda folder: change(folder, summary="x" * 10**6, also=1), "also"),
+        (lambda folder: change(folder, frames=10**30), "frames"),
+        (lambda folder: change(folder, gains={"surface": 1e300}), "surface"),
         (lambda folder: change(folder, layout="0123"), "observation layout"),
         (lambda folder: change(folder, action="thrusters"), "observation layout"),
         (lambda folder: change(folder, base="nobody"), "policy is 'nobody'"),
@@ -132,6 +162,8 @@ def test_a_spoilt_agent_is_refused_in_one_line(folder, spoil, message):
     with pytest.raises((ValueError, OSError), match=message) as caught:
         make_agent(NOMINAL, str(folder))
     assert "\n" not in str(caught.value)
+    assert "secret" not in str(caught.value)
+    assert len(str(caught.value)) < 2 * SAID
 
 
 def test_the_command_line_takes_a_folder(folder, capsys):

@@ -230,6 +230,30 @@ def test_wrong_options_get_one_line(folder, capsys, monkeypatch):
     assert not (folder / "no.html").exists()
 
 
+def test_a_result_gives_the_report_nothing_to_open_or_to_run(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    secret = tmp_path / "token.json"
+    secret.write_text('{"token": "s3cret"}')
+    agent = tmp_path / "agent"
+    agent.mkdir()
+    (agent / "agent.json").symlink_to(secret)
+    (tmp_path / "evil.py").write_text("raise SystemExit('s3cret')")
+    result = json.loads((folder / "result.json").read_text())
+    row = result["results"]["sta"]
+    for name in (f"sta@{secret}", str(agent), str(secret), "evil:Code", "x" * 10**5, "pd"):
+        result["results"][name] = row
+    Path("result.json").write_text(json.dumps(result))
+    main(["report", "result.json", "--output", "page.html"])
+    text = Path("page.html").read_text()
+    assert "s3cret" not in text + capsys.readouterr().err
+    assert "only registered policies are replayed" in text
+    status, said = command(
+        ["report", "result.json", "--policies", f"sta@{secret}", "--output", "no.html"], capsys
+    )
+    assert status == 2
+    assert "s3cret" not in said
+
+
 def test_the_whole_leaderboard_is_a_page(tmp_path):
     (file,) = ROOT.glob("results/*/leaderboard.json")
     main(["report", str(file), "--policies", "zero", "--output", str(tmp_path / "page.html")])

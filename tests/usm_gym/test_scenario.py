@@ -107,7 +107,7 @@ def test_fields_left_out_have_their_defaults() -> None:
         ({"inspection": {"filter_frequency": 0.0}}, ["filter_frequency"]),
         (
             {"inspection": {"times": list(range(9)), "deflections": [0.0] * 9}},
-            ["deflections", "8"],
+            ["times", "8"],
         ),
         ({"conditions": {"motion": "on"}}, ["conditions", "motion"]),
         ({"conditions": {"integrator": "rk4"}}, ["integrator", "rk4", "explicit"]),

@@ -1,0 +1,199 @@
+"""Hostile input: constructors, environments and their calls answer or raise ValueError."""
+
+import copy
+import json
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
+
+from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
+from usm_gym.conditions import conditions_of
+from usm_gym.env import USMEnv
+from usm_gym.robot import robot_of
+from usm_gym.scenario import MODES
+from usm_gym.validation import QUOTED, SAID, in_one_line
+from usm_gym.vector_env import USMVectorEnv
+
+# Physics steps times links that an example may take.
+AFFORDABLE = 300_000
+CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Scenario]
+
+
+def refused(call, *arguments, **options):
+    """Whether a call refuses its arguments, shortly, on one line; what it gives otherwise."""
+    try:
+        return False, call(*arguments, **options)
+    except ValueError as error:
+        text = in_one_line(error)
+        assert "\n" not in text
+        assert len(text) <= SAID + 2 * QUOTED
+        return True, None
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+@given(data=st.data())
+def test_constructors_refuse_or_make_what_json_gives_back(cls, data):
+    given_ = data.draw(st.one_of(almost_fields(cls), fields_in_range(cls)))
+    refused(cls, **{name: value for name, value in given_.items() if name.isidentifier()})
+
+
+@given(value=st.one_of(ANYTHING, almost_fields(Conditions), fields_in_range(Conditions)))
+def test_conditions_of_refuses_or_makes_conditions(value):
+    no, conditions = refused(conditions_of, value)
+    assert no or isinstance(conditions, Conditions)
+
+
+@given(value=st.one_of(ANYTHING, almost_fields(Robot), fields_in_range(Robot)))
+def test_robot_of_refuses_or_makes_a_robot(value):
+    no, robot = refused(robot_of, value)
+    assert no or isinstance(robot, Robot)
+
+
+@given(value=st.one_of(ANYTHING, almost_fields(Scenario), fields_in_range(Scenario)))
+def test_from_dict_refuses_or_makes_what_json_gives_back(value):
+    no, scenario = refused(Scenario.from_dict, value)
+    if not no:
+        assert Scenario.from_dict(json.loads(json.dumps(scenario.to_dict()))) == scenario
+
+
+def affordable(robot, scenario, periods):
+    steps = min(periods, scenario.steps) * scenario.conditions.substeps
+    return steps * robot.links <= AFFORDABLE and scenario.steps <= 100_000
+
+
+@st.composite
+def swims(draw):
+    """A robot, a scenario for it and forces, all within their ranges."""
+    no, robot = refused(robot_of, draw(fields_in_range(Robot)))
+    assume(not no)
+    fields = draw(fields_in_range(Scenario))
+    substeps = draw(st.integers(1, 40))
+    conditions = fields.setdefault("conditions", {})
+    step = conditions.setdefault("physics_step", 1e-3)
+    conditions["control_period"] = step * substeps
+    fields["duration"] = step * substeps * draw(st.integers(1, 60))
+    fields.setdefault("inspection", {})["bending_joints"] = draw(st.integers(1, robot.links - 1))
+    soon = st.floats(0.0, fields["duration"])
+    times = sorted(draw(st.lists(soon, max_size=4, unique=True)))
+    fields["inspection"]["times"] = times
+    deflection = st.floats(-100, 100)
+    fields["inspection"]["deflections"] = [draw(deflection) for _ in times]
+    no, scenario = refused(Scenario.from_dict, fields)
+    assume(not no)
+    forces = draw(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=8))
+    return robot, scenario, forces
+
+
+@given(swim=swims())
+def test_whatever_is_in_range_swims_or_is_lost_with_finite_observations(swim):
+    robot, scenario, forces = swim
+    assume(affordable(robot, scenario, 60))
+    env = USMEnv(scenario.mode, scenario.conditions, robot)
+    no, started = refused(env.reset, options={"scenario": scenario})
+    if no:
+        return
+    observation, info = started
+    ended = False
+    for step in range(60):
+        assert env.observation_space.contains(observation)
+        assert np.isfinite(list(info.values())).all()
+        if ended:
+            break
+        action = np.resize(np.array(forces[step % len(forces) :] + forces, np.float32), 64)
+        observation, reward, lost, over, info = env.step(action[: len(robot.thrusters)])
+        assert np.isfinite(reward)
+        assert lost == info["diverged"]
+        ended = lost or over
+
+
+def odd_actions(shape):
+    arrays = st.lists(NUMBERS, min_size=shape[-1], max_size=shape[-1])
+    return st.one_of(ANYTHING, arrays, arrays.map(lambda each: [each] * shape[0]))
+
+
+@pytest.fixture(scope="module")
+def env():
+    return USMEnv("operation")
+
+
+@pytest.fixture(scope="module")
+def envs():
+    return USMVectorEnv(3, "operation")
+
+
+@pytest.mark.filterwarnings("error")
+@given(action=odd_actions((3, 5)))
+def test_step_refuses_or_acts(env, envs, action):
+    for world in (env, envs):
+        world.reset(seed=0)
+        before = world.simulation.snapshot()
+        no, answer = refused(world.step, action)
+        if no:
+            after = world.simulation.snapshot()
+            assert all((after.arrays[key] == before.arrays[key]).all() for key in before.arrays)
+        else:
+            assert np.isfinite(answer[0]).all()
+
+
+def streams(world):
+    generators = world._streams if isinstance(world, USMVectorEnv) else [world.np_random]
+    return [copy.deepcopy(each.bit_generator.state) for each in generators]
+
+
+SCENARIOS = st.one_of(
+    st.sampled_from([None, "nominal", "table1"]),
+    ANYTHING,
+    almost_fields(Scenario),
+    st.sampled_from([{"conditions": {"control_period": 0.04}}, {"mode": "torpedo"}]),
+)
+OPTIONS = st.one_of(
+    ANYTHING,
+    st.fixed_dictionaries({"scenario": SCENARIOS}),
+    st.fixed_dictionaries(
+        {"scenario": st.one_of(SCENARIOS, st.lists(SCENARIOS, min_size=3, max_size=3))},
+        optional={"reset_mask": st.sampled_from([None, *map(np.array, ([True, False, True], 1))])},
+    ),
+)
+SEEDS = st.one_of(st.none(), st.integers(0, 9), ANYTHING, st.lists(st.integers(-1, 3), max_size=3))
+
+
+@given(seed=SEEDS, options=OPTIONS)
+def test_a_refused_reset_changes_nothing(env, envs, seed, options):
+    for world in (env, envs):
+        world.reset(seed=0)
+        before = world.simulation.snapshot(), streams(world), world.np_random_seed
+        no, _ = refused(world.reset, seed=seed, options=options)
+        if not no:
+            continue
+        after = world.simulation.snapshot(), streams(world), world.np_random_seed
+        assert after[0].scenarios == before[0].scenarios
+        for name, array in before[0].arrays.items():
+            np.testing.assert_array_equal(after[0].arrays[name], array)
+        assert after[1:] == before[1:]
+
+
+@given(
+    arguments=st.fixed_dictionaries(
+        {},
+        optional={
+            "num_envs": ANYTHING,
+            "threads": ANYTHING,
+            "conditions": ANYTHING,
+            "robot": ANYTHING,
+            "autoreset_mode": ANYTHING,
+            "mode": ANYTHING,
+        },
+    )
+)
+def test_environments_refuse_or_are_made(arguments):
+    wanted = {"num_envs": 2, "mode": "operation", **arguments}
+    if not isinstance(wanted["num_envs"], int) or wanted["num_envs"] < 1000:
+        refused(USMVectorEnv, **wanted)
+    del wanted["num_envs"]
+    for other in ("threads", "autoreset_mode"):
+        wanted.pop(other, None)
+    no, env = refused(USMEnv, **wanted)
+    assert no or env.mode in MODES
