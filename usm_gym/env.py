@@ -28,10 +28,11 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     """An underwater swimming manipulator whose centre of mass has to follow a path.
 
     Sixteen links, five thrusters. The thrusters hold the centre of mass on a slow path; in
-    operation mode (`USM-Operation-v0`) the joints meanwhile bend the head side of the body one way,
-    the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
-    (`USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the line of
-    sight. The score of an episode is the largest true position error in each axis after settling.
+    operation mode (`usm_gym:USM-Operation-v0`) the joints meanwhile bend the head side of the body
+    one way, the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
+    (`usm_gym:USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the
+    line of sight. The score of an episode is the largest true position error in each axis after
+    settling.
 
     ## Action
 

@@ -57,7 +57,7 @@ class VectorSnapshot:
 class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any]):
     """`num_envs` underwater swimming manipulators, each as in `USMEnv`, to the bit.
 
-    Made by `gym.make_vec("USM-Operation-v0", num_envs=256,
+    Made by `gym.make_vec("usm_gym:USM-Operation-v0", num_envs=256,
     vectorization_mode="vector_entry_point")`. Spaces, reward, start, end and info are those of
     `USMEnv` with a batch axis; robot i with seed s behaves as the single environment with seed s.
 
