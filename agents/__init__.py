@@ -4,6 +4,14 @@ Importing this package registers the residual tasks and the shipped agents; it d
 torch.
 """
 
+import sys
+
+if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)] == "agents":
+    # `python -m agents` imports this package before its __main__.py, which listens to Ctrl-C.
+    from usm_cli.main import listen
+
+    listen()
+
 import gymnasium as gym
 
 from agents.artifact import register_shipped

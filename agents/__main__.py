@@ -1,6 +1,6 @@
 """`python -m agents` is the `usm` command."""
 
-from agents.main import main
+from usm_cli.main import main
 
 if __name__ == "__main__":
     main()

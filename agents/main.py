@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import Any
 
 from agents.commands import (
     bench,
@@ -59,23 +59,29 @@ A first look:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a command and leave with its status: 2 for bad input, 130 for Ctrl-C."""
+    """Run a command and leave with its status: 2 for bad input or output that cannot be written."""
+    status: Any = None
+    try:
+        try:
+            chosen = parser().parse_args(arguments)
+            chosen.run(chosen)
+        except SystemExit as left:
+            status = left.code
+        sys.stdout.flush()
+    except BrokenPipeError:
+        status = 1  # the reader has gone, and knows
+    except (ValueError, OSError) as error:
+        print(f"usm: error: {in_one_line(error)}", file=sys.stderr)
+        status = 2
+    if status:
+        sys.exit(status)
+
+
+def parser() -> Parser:
+    """The parser of all commands."""
     parser = Parser(prog="usm", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:
         command.add_to(subparsers)
-    chosen = parser.parse_args(arguments)
-    try:
-        chosen.run(chosen)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("usm: interrupted", file=sys.stderr)
-        sys.exit(130)
-    except BrokenPipeError:
-        # The reader has gone; what is left in the buffer has nowhere to go.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
-    except (ValueError, OSError) as error:
-        print(f"usm: error: {in_one_line(error)}", file=sys.stderr)
-        sys.exit(2)
+    return parser

@@ -19,6 +19,8 @@ from usm_gym.validation import require
 
 # How long a cluster may take to accept a connection, s.
 CONNECTION_TIME = 10.0
+# Of anything that an option counts: more was meant otherwise.
+MOST, MOST_WORKERS = 1_000_000_000, 1000
 
 
 def check_installed(what: str, extra: str, *modules: str) -> None:
@@ -49,7 +51,8 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
 def computing(arguments: argparse.Namespace) -> Iterator[int]:
     """Make the cluster that the options ask for joblib's backend; gives the number of workers."""
     workers = arguments.workers
-    require(workers is None or workers >= 1, "--workers", workers, "1 or more")
+    allowed = f"1 to {MOST_WORKERS}"
+    require(workers is None or 1 <= workers <= MOST_WORKERS, "--workers", workers, allowed)
     if arguments.cluster is None:
         yield workers or 1
         return
@@ -93,10 +96,11 @@ def count(arguments: Any, option: str, default: int, least: int = 1) -> int:
     """An integer option, or its default.
 
     Raises:
-        ValueError: If it is too small.
+        ValueError: If it is too small or too large.
     """
     value = getattr(arguments, option)
-    require(value is None or value >= least, f"--{option}", value, f"{least} or more")
+    allowed = f"{least} to {MOST}"
+    require(value is None or least <= value <= MOST, f"--{option}", value, allowed)
     return default if value is None else int(value)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from agents.residual_observation import ResidualObserver
+from agents.residual_observer import ResidualObserver
 from baselines.contender import contender
 from baselines.estimator import Estimator
 from baselines.policy import Policy
@@ -38,11 +38,12 @@ class Memory(NamedTuple):
     """What the residual task keeps from one control instant to the next, the batch first.
 
     Attributes:
-        limit: Thruster limits, N, (batch, 1).
+        limit: Thruster limits, N, (batch,).
         allocation: Allocation matrices, (batch, 3, thrusters).
         base_action: The base's commands over the limit, not clipped, (batch, thrusters).
         base_state: State of the base.
-        observer_state: State of the residual task's observer, (batch, numbers).
+        estimator_state: State of the Kalman filter beside it, (batch, numbers).
+        frames: Earlier frames of the observation, physical values, (batch, numbers).
         action: The agent's last action, (batch, actions).
     """
 
@@ -50,15 +51,25 @@ class Memory(NamedTuple):
     allocation: NDArray[np.float64]
     base_action: Array
     base_state: Any
-    observer_state: NDArray[np.float64]
+    estimator_state: NDArray[np.float64]
+    frames: NDArray[np.float64]
     action: Array
 
 
 @compiled
-def allocate_all(allocation, wrench, forces):  # type: ignore[no-untyped-def]
-    """Fill in the thruster forces of least norm that make wrenches, (batch, thrusters)."""
-    for b in range(len(wrench)):
-        allocate(allocation[b], wrench[b, 0], wrench[b, 1], wrench[b, 2], forces[b])
+def correct_all(base_action, allocation, limit, residual, wrench, command):  # type: ignore[no-untyped-def]
+    """Fill in the commands over the limit, (batch, thrusters): the base's and a residual's.
+
+    Residuals are wrenches (N, N, N m), which thruster forces of least norm make, or forces, N.
+    """
+    forces = np.empty(base_action.shape[1])
+    for b in range(len(command)):
+        if wrench:
+            allocate(allocation[b], residual[b, 0], residual[b, 1], residual[b, 2], forces)
+        else:
+            forces[:] = residual[b]
+        for j in range(forces.size):
+            command[b, j] = base_action[b, j] + forces[j] / limit[b]
 
 
 class Residual:
@@ -111,12 +122,11 @@ class Residual:
         self.base = base
         self._scale, self._action = float(residual_scale), action
         plain = ObservationLayout(nominal.robot.links, len(nominal.robot.thrusters))
-        self._limit_part = plain.slices["thruster_limit"]
-        self._limit_scale = plain.scale[self._limit_part]
+        self._limit = plain.slices["thruster_limit"].start
+        self._limit_scale = plain.scale[self._limit]
         self.actions = 3 if action == "wrench" else plain.thrusters
-        self._observer = ResidualObserver(
-            base, plain, self.actions, Estimator(nominal), tuple(omit), frames
-        )
+        self._estimator = Estimator(nominal)
+        self._observer = ResidualObserver(base, plain, self.actions, tuple(omit), frames)
         self.layout = self._observer.layout
 
     @property
@@ -131,24 +141,33 @@ class Residual:
 
         Args:
             observation: Plain observations, (batch, numbers).
-            memory: What `command` returned; None at the start.
+            memory: What `command` returned; None at the start, of all episodes then.
             start: Where an episode starts, (batch,).
 
         Returns:
             Observations, (batch, layout.size), and what to keep.
         """
-        base_state, state = None, None
-        action = np.zeros((len(observation), self.actions), np.float32)
-        if memory is not None:
-            base_state, state = memory.base_state, memory.observer_state
-            action[~start] = memory.action[~start]
+        size = len(observation)
+        if memory is None:
+            start = np.ones(size, bool)
+            base_state, filtered = None, None
+            action = np.zeros((size, self.actions), np.float32)
+            past = np.empty((size, self._observer.earlier))
+        else:
+            base_state, filtered = memory.base_state, memory.estimator_state
+            action, past = memory.action, memory.frames
         base_action, base_state = self.base.predict(observation, base_state, start, True)
-        base_action = np.asarray(base_action, np.float32)
-        seen, signals, state = self._observer.update(
-            observation, base_action, base_state, action, state, start
+        base_action = np.ascontiguousarray(base_action, np.float32)
+        signals, estimates, innovation, filtered = self._estimator.update(
+            observation, filtered, start
         )
-        limit = observation[:, self._limit_part] * self._limit_scale
-        return seen, Memory(limit, signals.allocation, base_action, base_state, state, action)
+        seen, frames = self._observer.update(
+            signals, estimates, innovation, base_action, base_state, action, past, start
+        )
+        limit = observation[:, self._limit] * self._limit_scale
+        return seen, Memory(
+            limit, signals.allocation, base_action, base_state, filtered, frames, action
+        )
 
     def command(self, memory: Memory, action: Array) -> tuple[Array, Memory]:
         """Add residuals to the base's commands; the plant saturates the sum, once.
@@ -160,12 +179,16 @@ class Residual:
         Returns:
             Thruster commands over the limit, (batch, thrusters), and what to keep.
         """
-        action = np.clip(action, -1.0, 1.0)
-        forces = self._scale * action.astype(np.float64)
-        if self._action == "wrench":
-            wrench, forces = forces, np.empty(memory.base_action.shape)
-            allocate_all(memory.allocation, wrench, forces)
-        command = (memory.base_action + forces / memory.limit).astype(np.float32)
+        action = action.clip(-1.0, 1.0)
+        command = np.empty_like(memory.base_action)
+        correct_all(
+            memory.base_action,
+            memory.allocation,
+            memory.limit,
+            self._scale * action.astype(np.float64),
+            self._action == "wrench",
+            command,
+        )
         return command, memory._replace(action=action)
 
 

@@ -1,26 +1,16 @@
-"""What the agent of the residual task sees: the table, and the numbers from which it is filled."""
+"""What the agent of the residual task sees: the table, which `residual_observer` fills."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from baselines.estimator import Estimator
 from baselines.lqg import LQG, JointLQG
 from baselines.mpc import MPC
 from baselines.pd import PD
-from baselines.policy import Policy, ScriptedPolicy, Signals
-from baselines.prediction import ESTIMATES
 from baselines.super_twisting import SuperTwisting
-from usm_gym.observation import Entry, Layout, ObservationLayout
+from usm_gym.observation import Entry, Layout
 from usm_gym.validation import require
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _RATE = Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer")
 _DISTURBANCE = Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same")
@@ -115,111 +105,3 @@ class ResidualLayout(Layout):
             for entry in self.frame
         ]
         return (*earlier, *self.frame)
-
-
-class ResidualObserver:
-    """Makes the agent's observation from the plain one, for a batch.
-
-    Attributes:
-        layout: The table.
-    """
-
-    def __init__(
-        self,
-        base: Policy,
-        plain: ObservationLayout,
-        actions: int,
-        estimator: Estimator,
-        omit: tuple[str, ...],
-        frames: int,
-    ) -> None:
-        """Take the base, whose state is shown, and the layout of the plain observation."""
-        self._base, self._plain, self._estimator = base, plain, estimator
-        self._shown = BASE_STATES.get(type(base), {})
-        entries = tuple(self._shown.values())
-        self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
-
-    def update(
-        self,
-        observation: NDArray[np.float32],
-        base_action: NDArray[np.float32],
-        base_state: Any,
-        last_action: NDArray[np.float32],
-        state: Array | None,
-        start: Flags,
-    ) -> tuple[NDArray[np.float32], Signals, Array]:
-        """Take in a batch of observations.
-
-        Args:
-            observation: Plain observations, (batch, numbers).
-            base_action: The base's commands over the limit, not clipped, (batch, thrusters).
-            base_state: The base's state after that.
-            last_action: The agent's last action, zero at the start, (batch, actions).
-            state: What the last call returned; None at the start.
-            start: Where an episode starts, (batch,).
-
-        Returns:
-            The agent's observations, (batch, layout.size); what was measured; and the state for the
-            next call.
-        """
-        earlier = self.layout.size - self.layout.size // self.layout.frames
-        past, filtered = (None, None) if state is None else np.split(state, [earlier], axis=1)
-        signals, estimates, innovation, filtered = self._estimator.update(
-            observation, filtered, start
-        )
-        value = self._values(observation)
-        references = value["joint_references"]
-        links = self._plain.links
-        # Of the rates of the joints, that of joint i turns the links after it.
-        behind = np.arange(links - 1, 0, -1) / links
-        numbers: dict[str, Array] = {
-            "position_error": signals.y,
-            "reference_velocity": signals.velocity,
-            "reference_acceleration": signals.acceleration,
-            "estimated_error": estimates[:, :, 0],
-            "estimated_rate": estimates[:, :, 1],
-            "estimated_disturbance": estimates[:, :, 2],
-            "estimated_thrust": estimates[:, :, 3],
-            "innovation": innovation,
-            **self._base_numbers(signals, base_action * value["thruster_limit"], base_state),
-            "thruster_command": value["thruster_command"],
-            "last_action": last_action.astype(np.float64),
-            "heading": value["tail_angle"] - _sum(behind * value["joint_angles"]),
-            "heading_error": value["heading_error"],
-            "heading_rate": value["tail_rate"] - _sum(behind * value["joint_rates"]),
-            "deflection": _sum(value["joint_angles"]),
-            "deflection_rate": _sum(value["joint_rates"]),
-            "reference_deflection": _sum(references),
-            "reference_deflection_rate": _sum(value["joint_reference_rates"]),
-            "reference_deflection_acceleration": _sum(value["joint_reference_accelerations"]),
-            "bending_joints": _sum((references != 0.0).astype(np.float64)),
-        }
-        frame = np.concatenate([numbers[entry.name] for entry in self.layout.frame], axis=1)
-        frames = np.tile(frame, self.layout.frames)
-        if past is not None:
-            frames[~start, :earlier] = past[~start]
-        seen = np.clip(frames / self.layout.scale, -self.layout.bound, self.layout.bound)
-        kept = frames[:, frames.shape[1] - earlier :]
-        return seen.astype(np.float32), signals, np.concatenate([kept, filtered], axis=1)
-
-    def _base_numbers(
-        self, signals: Signals, forces: NDArray[np.float64], state: Any
-    ) -> dict[str, Array]:
-        wrench = np.einsum("bwt,bt->bw", signals.allocation, forces)
-        numbers = {"base_force": wrench[:, :2], "base_moment": wrench[:, 2:]}
-        if self._shown:
-            assert isinstance(self._base, ScriptedPolicy)
-            law = self._base.law_state(state)
-            if law.ndim == 2:  # a predictor's: (e, v, d) of x and of y come first
-                law = law[:, :ESTIMATES].reshape(len(law), 2, -1)
-            for index, entry in self._shown.items():
-                numbers[entry.name] = law[:, :, index]
-        return numbers
-
-    def _values(self, observation: NDArray[np.float32]) -> dict[str, Array]:
-        physical = observation * self._plain.scale
-        return {name: physical[:, part] for name, part in self._plain.slices.items()}
-
-
-def _sum(values: Array) -> Array:
-    return np.asarray(values.sum(axis=1, keepdims=True))

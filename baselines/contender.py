@@ -107,11 +107,12 @@ def registered(name: str, entry: Entry) -> Contender:
 def own(name: str) -> Callable[[Nominal], Any]:
     """The factory `module:attribute`, which takes the nominal knowledge or nothing.
 
-    Modules are looked for in the current folder, too.
+    Modules are looked for in the current folder, too, but there last: a folder that is named like
+    one of our packages hides none.
     """
     path, _, attribute = name.partition(":")
     if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
+        sys.path.append(os.getcwd())
     try:
         module = importlib.import_module(path)
     except Exception as error:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines import kalman
-from baselines.policy import Array, Signals, model_of, signals_of
+from baselines.policy import Array, Signals, model_of, room_for_signals, sense
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled
 
@@ -16,12 +16,20 @@ ACCELERATION_NOISE, DISTURBANCE_NOISE = 1e-2, 0.3
 
 
 @compiled
-def estimate_all(signals, mass, model, state, innovation):
-    """Filter both axes of a batch; fills in the innovations, m, (batch, 2)."""
+def estimate_all(state, model, linear, signals, estimates, innovation):
+    """Sense, filter both axes, keep what the next call needs; see `Estimator.update`."""
+    sense(state, model, signals)
+    thrusters = model.thruster_links.size
+    first = 1 + 2 * thrusters
     for b in range(innovation.shape[0]):
+        state[b, 0] = 1.0
         for axis in range(2):
-            own = state[b, axis]
-            _, _, innovation[b, axis] = kalman.estimate(signals, mass, model, b, axis, own)
+            at = first + kalman.STATES * axis
+            own = state[b, at : at + kalman.STATES]
+            _, _, innovation[b, axis] = kalman.estimate(signals, model.mass, linear, b, axis, own)
+            estimates[b, axis] = own
+            for j in range(thrusters):
+                state[b, 1 + axis * thrusters + j] = signals.allocation[b, axis, j]
 
 
 class Estimator:
@@ -50,16 +58,13 @@ class Estimator:
             What was measured and applied; (e, v, d, f) of each axis in m, m/s, m/s^2 and m/s^2,
             (batch, 2, 4); innovations, m, (batch, 2); and the state for the next call.
         """
-        size, thrusters = len(observation), self._thrusters
-        filtered = 1 + 2 * thrusters
-        new = np.zeros((size, filtered + 2 * kalman.STATES))
-        if state is not None:
-            new[~start] = state[~start]
-        signals = signals_of(observation, new, self._model)
-        innovation = np.empty((size, 2))
-        estimates = new[:, filtered:].reshape(size, 2, kalman.STATES).copy()
-        estimate_all(signals, self._model.mass, self._linear, estimates, innovation)
-        new[:, 0] = 1.0
-        new[:, 1:filtered] = signals.allocation[:, :2].reshape(size, -1)
-        new[:, filtered:] = estimates.reshape(size, -1)
+        size = len(observation)
+        if state is None:
+            new = np.zeros((size, 1 + 2 * self._thrusters + 2 * kalman.STATES))
+        else:
+            new = state.copy()
+            new[start] = 0.0
+        signals = room_for_signals(observation, self._thrusters)
+        estimates, innovation = np.empty((size, 2, kalman.STATES)), np.empty((size, 2))
+        estimate_all(new, self._model, self._linear, signals, estimates, innovation)
         return signals, estimates, innovation, new

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from baselines.space import Range
 from usm_gym.nominal import Nominal
 from usm_gym.observation import ObservationLayout
-from usm_gym.plant.compile import compiled, piece
+from usm_gym.plant.compile import compiled
 from usm_gym.plant.elementary import sincos
 from usm_gym.plant.measure import (
     HEADING_ERROR,
@@ -27,6 +27,7 @@ from usm_gym.plant.measure import (
     TAIL_ANGLE,
     THRUSTER_COMMAND,
     THRUSTER_LIMIT,
+    value,
 )
 from usm_gym.plant.thrusters import allocate, allocation_matrix
 from usm_gym.validation import require
@@ -113,13 +114,6 @@ def model_of(nominal: Nominal) -> Model:
     )
 
 
-@piece
-def value(observation, model, entry, index):
-    """One number of an observation in its physical unit."""
-    k = model.starts[entry] + index
-    return observation[k] * model.scale[k]
-
-
 @compiled
 def sense(state, model, signals):
     """Fill in the signals from the observations among them and the shared part of the state.
@@ -169,14 +163,12 @@ def act(observation, state, model, allocation, force, heading_gain, action):
             state[b, 1 + thrusters + j] = T[1, j]
 
 
-def signals_of(observation: NDArray[np.float32], state: Array, model: Model) -> Signals:
-    """The signals of a batch, from its observations and the shared part of its state."""
+def room_for_signals(observation: NDArray[np.float32], thrusters: int) -> Signals:
+    """Signals of a batch that `sense` has to fill in."""
     size = len(observation)
     y, u, velocity, acceleration = np.empty((4, size, 2))
-    allocation = np.empty((size, 3, model.thruster_links.size))
-    signals = Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
-    sense(state, model, signals)
-    return signals
+    allocation = np.empty((size, 3, thrusters))
+    return Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
 
 
 class ScriptedPolicy:
@@ -211,6 +203,8 @@ class ScriptedPolicy:
         self.gains = type(gains)(*map(float, gains))
         self._model = model_of(nominal)
         self._thrusters = len(nominal.robot.thrusters)
+        # Before the law's own numbers stand those that all laws share.
+        self._own = 1 + 2 * self._thrusters
 
     @property
     def law_shape(self) -> tuple[int, ...]:
@@ -222,8 +216,13 @@ class ScriptedPolicy:
 
         What its numbers are, the law says in its docstring.
         """
-        own = state[:, 1 + 2 * self._thrusters :]
-        return own.reshape(len(state), *self.law_shape).copy()
+        return state[:, self._own :].reshape(len(state), *self.law_shape).copy()
+
+    @property
+    def law_columns(self) -> NDArray[np.int64]:
+        """Columns of what `predict` returns in which the law's own numbers stand, (*law_shape)."""
+        columns = self._own + np.arange(math.prod(self.law_shape), dtype=np.int64)
+        return columns.reshape(self.law_shape)
 
     def force(self, signals: Signals, law_state: Array) -> Array:
         """The force on the centre of mass, N, (batch, 2); the law's state is advanced in place.
@@ -271,22 +270,24 @@ class ScriptedPolicy:
         return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
-        size, thrusters = len(observation), self._thrusters
-        signals = signals_of(observation, state, self._model)
+        size = len(observation)
+        signals = room_for_signals(observation, self._thrusters)
+        sense(state, self._model, signals)
         law_state = self.law_state(state)
         force = self.force(signals, law_state)
-        state[:, 1 + 2 * thrusters :] = law_state.reshape(size, -1)
-        action = np.empty((size, thrusters), np.float32)
+        state[:, self._own :] = law_state.reshape(size, -1)
+        action = np.empty((size, self._thrusters), np.float32)
         gain = float(self.gains.heading_gain)
         act(observation, state, self._model, signals.allocation, force, gain, action)
         return action
 
     def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:
-        numbers = 1 + 2 * self._thrusters + math.prod(self.law_shape)
+        numbers = self._own + math.prod(self.law_shape)
         if state is None:
             return np.zeros((size, numbers))
         new = np.array(state, np.float64)
         require(new.shape == (size, numbers), "state", new.shape, f"shape ({size}, {numbers})")
         if episode_start is not None:
-            new[np.broadcast_to(np.asarray(episode_start, bool), (size,))] = 0.0
+            start = np.asarray(episode_start, bool)
+            new[start if start.shape == (size,) else np.broadcast_to(start, (size,))] = 0.0
         return new

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.policy import Array, Model, Signals, value
+from baselines.policy import Array, Model, Signals
 from usm_gym.nominal import Nominal
 from usm_gym.plant.compile import compiled, piece
 from usm_gym.plant.lanes import WIDTH, block_at, spread
@@ -31,6 +31,7 @@ from usm_gym.plant.measure import (
     TAIL_RATE,
     THRUSTER_COMMAND,
     THRUSTER_LIMIT,
+    value,
 )
 from usm_gym.plant.motion import filter_coefficients, lag_share
 from usm_gym.plant.step import Plant, advance

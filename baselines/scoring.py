@@ -33,7 +33,7 @@ from usm_gym.validation import in_one_line, require
 # Episodes that a policy meets side by side; a multiple of the plant's lanes.
 BATCH = 64
 # How long the code of others may think in a batch, s.
-TIME_LIMIT = 240.0
+TIME_LIMIT, LONGEST_TIME = 240.0, 1e6
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,8 @@ class Task:
 
     def __post_init__(self) -> None:
         """Refuse a time limit that leaves no time."""
-        require(self.time_limit > 0, "time_limit", self.time_limit, "a number > 0")
+        allowed = f"more than 0, up to {LONGEST_TIME:g} s"
+        require(0 < self.time_limit <= LONGEST_TIME, "time_limit", self.time_limit, allowed)
 
     @property
     def key(self) -> str | None:

@@ -43,6 +43,7 @@ LEFT_OUT = (
     "pip install",
     "pre-commit",
     "pytest",
+    "HYPOTHESIS_PROFILE",
     "mkdocs",
     "usm bench",
     "usm reproduce",

@@ -5,6 +5,7 @@ from importlib.metadata import version
 from usm_gym.conditions import Conditions
 from usm_gym.dynamics import accelerations
 from usm_gym.evaluation import Evaluation, evaluate
+from usm_gym.linear_model import LinearModel, linearise
 from usm_gym.metrics import max_error
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
@@ -15,6 +16,7 @@ __all__ = [
     "Conditions",
     "Evaluation",
     "Inspection",
+    "LinearModel",
     "Path",
     "Robot",
     "Scenario",
@@ -22,6 +24,7 @@ __all__ = [
     "Water",
     "accelerations",
     "evaluate",
+    "linearise",
     "max_error",
     "suite",
 ]

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.plant import layout
-from usm_gym.plant.chain import Body, accelerate_one
+from usm_gym.plant.chain import Body, accelerate_all
 from usm_gym.robot import Hydrodynamics, Robot
-from usm_gym.validation import require
+from usm_gym.validation import brief, real_array, require
+
+Array = NDArray[np.float64]
 
 HYDRODYNAMICS: tuple[Hydrodynamics, ...] = get_args(Hydrodynamics)
+# States that are worked on at a time: what the kernel needs for each is some 3 kB.
+CHUNK = 1024
 
 
 def accelerations(
@@ -23,27 +26,33 @@ def accelerations(
     p_dot: ArrayLike,
     joint_torques: ArrayLike,
     thruster_forces: ArrayLike,
-    current: Sequence[float] = (0.0, 0.0),
+    current: ArrayLike = (0.0, 0.0),
     hydrodynamics: Hydrodynamics = "consistent",
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Compute the accelerations of a robot in a given state (docs/model.md, equation 10).
+) -> tuple[Array, Array]:
+    """Compute the accelerations of a robot in given states (docs/model.md, equation 10).
+
+    Any argument may have axes in front of its last one. They are broadcast against each other as
+    NumPy does it, so that an argument without them is shared by all states. Each state gives the
+    same bits as it would alone.
 
     Args:
         robot: The robot; its own joint gains play no part here.
-        theta: Link angles, rad, shape (n,), link 1 = tail first.
-        theta_dot: Link rates, rad/s, shape (n,).
-        p_dot: Velocity of the centre of mass in the global frame, m/s, shape (2,).
-        joint_torques: Torque of joint i on link i (and its opposite on link i + 1), N m, (n-1,).
-        thruster_forces: Forces of the thrusters in layout order, N.
-        current: Velocity of the water in the global frame, constant, m/s.
+        theta: Link angles, rad, shape (..., n), link 1 = tail first.
+        theta_dot: Link rates, rad/s, shape (..., n).
+        p_dot: Velocity of the centre of mass in the global frame, m/s, shape (..., 2).
+        joint_torques: Torque of joint i on link i (and its opposite on link i + 1), N m, shape
+            (..., n-1).
+        thruster_forces: Forces of the thrusters in layout order, N, shape (..., thrusters).
+        current: Velocity of the water in the global frame, constant, m/s, shape (..., 2).
         hydrodynamics: "consistent" (Kirchhoff's added mass) or "kelasidi2014" (as published).
 
     Returns:
-        Angular accelerations, rad/s^2, shape (n,), and the acceleration of the centre of mass in
-        the global frame, m/s^2, shape (2,).
+        Angular accelerations, rad/s^2, shape (..., n), and the acceleration of the centre of mass
+        in the global frame, m/s^2, shape (..., 2).
 
     Raises:
-        ValueError: If a shape is wrong, a value is not finite or the form is unknown.
+        ValueError: If a shape is wrong, shapes do not broadcast, a value is not finite or the form
+            is unknown.
     """
     n = robot.links
     require(
@@ -52,19 +61,15 @@ def accelerations(
         hydrodynamics,
         " or ".join(map(repr, HYDRODYNAMICS)),
     )
-    block = np.zeros(layout.rows(n, 0))
-    links = block[layout.HEADER :].reshape(layout.QUANTITIES, layout.padded(n))[:, :n]
-    links[layout.THETA] = _vector("theta", theta, n)
-    links[layout.OMEGA] = _vector("theta_dot", theta_dot, n)
-    links[layout.SIDE] = layout.sides(n)
-    links[layout.TORQUE, :-1] = _vector("joint_torques", joint_torques, n - 1)
-    forces = _vector("thruster_forces", thruster_forces, len(robot.thrusters))
-    normal = robot.thruster_is_normal
-    np.add.at(links[layout.PUSH_T], robot.thruster_links[~normal], forces[~normal])
-    np.add.at(links[layout.PUSH_N], robot.thruster_links[normal], forces[normal])
-    block[layout.V_X : layout.V_Y + 1] = _vector("p_dot", p_dot, 2)
-    block[layout.WATER_X : layout.WATER_Y + 1] = _vector("current", current, 2)
-    block[layout.C_T : layout.LAMBDA_3 + 1] = robot.hydrodynamic_coefficients
+    given = {
+        "theta": _vectors("theta", theta, n),
+        "theta_dot": _vectors("theta_dot", theta_dot, n),
+        "p_dot": _vectors("p_dot", p_dot, 2),
+        "joint_torques": _vectors("joint_torques", joint_torques, n - 1),
+        "thruster_forces": _vectors("thruster_forces", thruster_forces, len(robot.thrusters)),
+        "current": _vectors("current", current, 2),
+    }
+    batch, states = _broadcast(given)
     body = Body(
         l=robot.half_length,
         m=robot.link_mass,
@@ -72,12 +77,62 @@ def accelerations(
         implicit=0.0,
         kirchhoff=float(hydrodynamics == "consistent"),
     )
-    accelerate_one(block[np.newaxis], n, body)
-    return links[layout.ALPHA].copy(), block[layout.A_X : layout.A_Y + 1].copy()
+    size = len(states[0])
+    theta_ddot, p_ddot = np.empty((size, n)), np.empty((size, 2))
+    for first in range(0, size, CHUNK):
+        part = slice(first, first + CHUNK)
+        blocks = _blocks(robot, *(state[part] for state in states))
+        accelerate_all(blocks, n, body)
+        alpha = layout.row_of(layout.ALPHA, n)
+        theta_ddot[part] = blocks[:, alpha : alpha + n]
+        p_ddot[part] = blocks[:, layout.A_X : layout.A_Y + 1]
+    return theta_ddot.reshape(*batch, n), p_ddot.reshape(*batch, 2)
 
 
-def _vector(name: str, value: Any, size: int) -> NDArray[np.float64]:
-    array = np.asarray(value, dtype=np.float64)
-    require(array.shape == (size,), name, value, f"an array of shape ({size},)")
+def _blocks(
+    robot: Robot,
+    theta: Array,
+    theta_dot: Array,
+    p_dot: Array,
+    joint_torques: Array,
+    thruster_forces: Array,
+    current: Array,
+) -> Array:
+    n, size = robot.links, len(theta)
+    blocks = np.zeros((size, layout.rows(n, 0)))
+    quantities = (size, layout.QUANTITIES, layout.padded(n))
+    links = blocks[:, layout.HEADER :].reshape(quantities)[:, :, :n]
+    links[:, layout.THETA] = theta
+    links[:, layout.OMEGA] = theta_dot
+    links[:, layout.SIDE] = layout.sides(n)
+    links[:, layout.TORQUE, :-1] = joint_torques
+    for j, thruster in enumerate(robot.thrusters):
+        push = layout.PUSH_N if thruster.direction == "normal" else layout.PUSH_T
+        links[:, push, thruster.link - 1] += thruster_forces[:, j]
+    blocks[:, layout.V_X : layout.V_Y + 1] = p_dot
+    blocks[:, layout.WATER_X : layout.WATER_Y + 1] = current
+    blocks[:, layout.C_T : layout.LAMBDA_3 + 1] = robot.hydrodynamic_coefficients
+    return blocks
+
+
+def _vectors(name: str, value: Any, size: int) -> Array:
+    array = real_array(name, value)
+    allowed = f"an array of shape ({size},) or (..., {size})"
+    require(array.ndim >= 1 and array.shape[-1] == size, name, value, allowed)
     require(np.isfinite(array).all(), name, value, "finite numbers")
-    return array
+    return np.asarray(array, np.float64)
+
+
+def _broadcast(given: dict[str, Array]) -> tuple[tuple[int, ...], list[Array]]:
+    """The shape of the batch, and the arguments for all of it, (size, ...)."""
+    shapes = {name: array.shape[:-1] for name, array in given.items()}
+    if not any(shapes.values()):
+        return (), [array[np.newaxis] for array in given.values()]
+    try:
+        batch = np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        leading = {name: shape for name, shape in shapes.items() if shape}
+        allowed = "shapes that NumPy broadcasts"
+        raise ValueError(f"the leading axes are {brief(leading)}; allowed: {allowed}") from None
+    whole = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in given.values()]
+    return batch, [array.reshape(-1, array.shape[-1]) for array in whole]

@@ -18,7 +18,7 @@ from usm_gym.reward import reward, reward_of_loss
 from usm_gym.robot import Robot, robot_of
 from usm_gym.scenario import Mode, Scenario, mode_of, named, sample
 from usm_gym.simulation import Simulation, Snapshot
-from usm_gym.validation import brief, is_whole, require
+from usm_gym.validation import is_whole, real_array, require
 from usm_gym.viewer import RENDER_MODES, Viewer
 
 Observation = NDArray[np.float32]
@@ -255,13 +255,9 @@ def saturated(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
     Raises:
         ValueError: If it is no array of real numbers of that shape.
     """
-    try:
-        array = np.asarray(action)
-    except Exception as error:  # whatever an object does that shall become an array
-        raise ValueError(f"action is {brief(action)}; allowed: an array of numbers") from error
-    require(array.dtype.kind in "fiub", "action", action, "an array of real numbers")
+    array = real_array("action", action)
     require(array.shape == shape, "the action's shape", array.shape, f"{shape}")
-    return np.asarray(np.clip(array, -1.0, 1.0), np.float32)
+    return np.asarray(array.clip(-1.0, 1.0), np.float32)
 
 
 def checked_seed(seed: Any) -> int | None:

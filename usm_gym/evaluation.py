@@ -17,9 +17,11 @@ from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.simulation import Simulation
 from usm_gym.statistics import mean_interval
-from usm_gym.validation import require
+from usm_gym.validation import is_whole, require
 
 AXES = ("x", "y")
+# What side by side is kept of all episodes: some three gigabytes.
+MOST_SAMPLES = 50_000_000
 POSITION_METRICS = tuple(
     f"{name}_{axis}" for name in ("max_error", "settled_error", "rms_error") for axis in AXES
 )
@@ -115,8 +117,10 @@ def evaluate(
         ValueError: If there is no scenario, or the policy wants another observation or returns what
             is no action.
     """
-    require(len(scenarios) > 0, "scenarios", scenarios, "one or more")
-    require(workers >= 1, "workers", workers, "1 or more")
+    listed = isinstance(scenarios, Sequence) and len(scenarios) > 0
+    valid = listed and all(isinstance(each, Scenario) for each in scenarios)
+    require(valid, "scenarios", scenarios, "a list of one Scenario or more")
+    require(is_whole(workers, 1), "workers", workers, "1 or more")
     report = progress or (lambda episodes: None)
     body = robot or Robot()
     _require_fit(policy, body)
@@ -196,10 +200,16 @@ def _run(
     progress: Callable[[float], None],
     watch: Callable[[Simulation], None],
 ) -> list[Trajectory]:
+    size, thrusters = len(scenarios), len(robot.thrusters)
+    length = max(scenario.steps for scenario in scenarios)
+    require(
+        size * length <= MOST_SAMPLES,
+        "scenarios",
+        f"{size} episodes of up to {length} control periods",
+        f"{MOST_SAMPLES} control periods side by side",
+    )
     simulation = Simulation(robot, scenarios)
     watch(simulation)
-    size, thrusters = simulation.size, len(robot.thrusters)
-    length = int(simulation.steps.max())
     error = np.empty((length, size, 2))
     heading = np.empty((length, size))
     command = np.empty((length, size, thrusters))

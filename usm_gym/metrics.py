@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from usm_gym.validation import require
+from usm_gym.validation import real_array, require
 
 # Controllers are given this long after each change of the joint references, s.
 RECOVERY = 7.0
@@ -86,7 +86,10 @@ def saturation_share(command: ArrayLike, limit: float) -> float:
 def _checked(
     time: ArrayLike, error: ArrayLike, settle_time: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    times, errors = np.asarray(time, np.float64), np.asarray(error, np.float64)
+    times = real_array("time", time).astype(np.float64)
+    errors = real_array("error", error).astype(np.float64)
+    settled = real_array("settle_time", settle_time)
+    require(settled.ndim == 0, "settle_time", settle_time, "a number, s")
     require(times.ndim == 1, "time", times.shape, "one dimension")
     require(errors.shape == (times.size, 2), "error", errors.shape, f"shape ({times.size}, 2)")
     require(np.isfinite(times).all(), "time", "not finite", "finite numbers")

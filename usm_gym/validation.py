@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 
 T = TypeVar("T")
@@ -14,8 +15,6 @@ T = TypeVar("T")
 CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 Number = Annotated[float, Strict()]
-Positive = Annotated[float, Strict(), Field(gt=0)]
-NonNegative = Annotated[float, Strict(), Field(ge=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Switch = Annotated[bool, Strict()]
 
@@ -49,6 +48,20 @@ def is_whole(value: object, low: int, high: int | None = None) -> bool:
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
         return False
     return bool(low <= value and (high is None or value <= high))
+
+
+def real_array(name: str, value: object, allowed: str = "real numbers") -> NDArray[Any]:
+    """Give a value as an array, of the type of numbers that it has.
+
+    Raises:
+        ValueError: If it holds anything but real numbers.
+    """
+    try:
+        array = np.asarray(value)
+    except Exception as error:  # whatever an object does that is to become an array
+        raise ValueError(f"{name} is {brief(value)}; allowed: {allowed}") from error
+    require(array.dtype.kind in "biuf", name, value, allowed)
+    return array
 
 
 def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dict of fields") -> T:

@@ -72,7 +72,7 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Measure, print, write."""
     rounds = arguments.rounds
-    require(rounds >= 1, "--rounds", rounds, "1 or more")
+    require(1 <= rounds <= 10_000, "--rounds", rounds, "1 to 10000")
     if arguments.output:
         check_writable(arguments.output)
     tasks, missing = available()

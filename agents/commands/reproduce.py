@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -164,7 +165,7 @@ def check_step(step: float) -> None:
     """Refuse a step at which the records' instants would be missed."""
     count = SAMPLE_TIME / step if step > 0 else 0.0
     require(
-        count >= 1.0 and abs(count - round(count)) < 1e-6 * count,
+        1.0 <= count < math.inf and abs(count - round(count)) < 1e-6 * count,
         "--step",
         step,
         f"a positive number of which {SAMPLE_TIME:g} s is a multiple",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +63,7 @@ def run(arguments: argparse.Namespace) -> None:
     from usm_gym.window import has_display
 
     speed, path = arguments.speed, arguments.output and Path(arguments.output)
-    require(0 < speed < math.inf, "--speed", speed, "a number > 0")
+    require(0.01 <= speed <= 1000, "--speed", speed, "0.01 to 1000")
     medium = "window"
     if path:
         medium = path.suffix

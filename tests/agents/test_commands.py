@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from interrupts import listening
 
 from agents.main import main
 
@@ -187,7 +188,7 @@ class Waiting:
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
     (tmp_path / "mine.py").write_text(WAITING)
     process = subprocess.Popen(
-        [USM, "evaluate", "--policies", "mine:Waiting", "--output", "result.json"],
+        listening(USM, "evaluate", "--policies", "mine:Waiting", "--output", "result.json"),
         cwd=tmp_path,
         env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         stderr=subprocess.PIPE,
@@ -201,6 +202,41 @@ def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
     assert process.returncode == 130
     assert errors == "usm: interrupted\n"
     assert {file.name for file in tmp_path.iterdir()} == {"mine.py", "acting"}
+
+
+OWN = """
+import os
+
+class Zero:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return 0.0 * observation[:, :5], state
+
+class Leaving(Zero):
+    def predict(self, *arguments, **options):
+        os._exit(3)
+"""
+
+
+def test_own_folders_named_like_ours_hide_none_and_workers_find_own_modules(tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    for package in ("agents", "baselines", "usm_gym", "usm_cli", "tests"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("raise ImportError('not this one')")
+    arguments = ("--episodes", "2", "--workers", "2", "--output", "result.json")
+    answer = usm("evaluate", "--policies", "zero,mine:Zero", *arguments, cwd=tmp_path)
+    assert (answer.returncode, answer.stderr) == (0, "")
+    results = json.loads((tmp_path / "result.json").read_text())["results"]
+    assert results["zero"] == results["mine:Zero"]
+
+
+def test_a_worker_that_ends_early_is_one_line(tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    arguments = ("--policies", "zero,mine:Leaving", "--episodes", "2", "--workers", "2")
+    answer = usm("evaluate", *arguments, cwd=tmp_path)
+    assert answer.returncode == 2
+    assert answer.stderr == (
+        "usm: error: a worker process ended before its task was done: EXIT(3)\n"
+    )
 
 
 def test_a_closed_pipe_leaves_no_traceback():

@@ -14,6 +14,7 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
+from interrupts import listening, listening_here
 
 import usm_gym
 from agents import film
@@ -116,7 +117,7 @@ def test_a_lost_robot_keeps_its_last_picture():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--speed", "0"], "--speed is 0.0; allowed: a number > 0"),
+        (["--speed", "0"], "--speed is 0.0; allowed: 0.01 to 1000"),
         (["--speed", "inf"], "--speed is inf"),
         (["--output", "run.avi"], "--output is 'run.avi'; allowed: a file .mp4 or .gif"),
         (["--output", "missing/run.mp4"], "no directory missing"),
@@ -198,7 +199,7 @@ def test_a_closed_window_ends_the_show():
 
 def test_ctrl_c_closes_the_window():
     others = set(_windows)
-    with pytest.raises(KeyboardInterrupt):
+    with listening_here(), pytest.raises(KeyboardInterrupt):
         film.play(Endless(lambda: signal.raise_signal(signal.SIGINT)), 1000.0)
     assert _windows == others
 
@@ -238,7 +239,7 @@ def test_a_full_disk_leaves_one_line_and_no_file(output):
 
 def test_ctrl_c_leaves_with_status_130_and_no_file(output):
     arguments = ["watch", "--seed", "1", "--speed", "0.01", "--output", output]
-    process = subprocess.Popen([USM, *arguments], stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(listening(USM, *arguments), stderr=subprocess.PIPE, text=True)
     while process.poll() is None and not list(output.parent.glob("run.part*")):
         time.sleep(0.1)
     time.sleep(0.5)

@@ -76,19 +76,26 @@ def test_a_processor_without_vector_or_fused_instructions_computes_the_same_bits
     assert run(FLEET, **generic) == run(FLEET)
 
 
-def test_without_a_writable_folder_kernels_work_after_a_warning(monkeypatch, tmp_path):
+@pytest.fixture
+def fresh():
+    """Let the cache folder be looked for anew, in this test and after it."""
+    caches = compiling.cache_folder, compiling._warn_of_no_cache
+    for each in caches:
+        each.cache_clear()
+    yield
+    for each in caches:
+        each.cache_clear()
+
+
+def test_without_a_writable_folder_kernels_work_after_a_warning(fresh, monkeypatch, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiling.platformdirs, "user_cache_path", lambda name: blocked / name)
     monkeypatch.setattr(compiling.tempfile, "gettempdir", lambda: str(blocked))
-    compiling.cache_folder.cache_clear()
-    try:
-        with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR"):
-            double = compiling.compiled(lambda x: 2.0 * x)
-        assert double(2.0) == 4.0
-    finally:
-        compiling.cache_folder.cache_clear()
+    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR"):
+        double = compiling.compiled(lambda x: 2.0 * x)
+    assert double(2.0) == 4.0
 
 
 def test_an_unwritable_home_falls_back_to_the_temporary_directory(tmp_path):
@@ -97,3 +104,130 @@ def test_an_unwritable_home_falls_back_to_the_temporary_directory(tmp_path):
     code = "from usm_gym.plant.compile import cache_folder, PACKAGE; print(cache_folder(PACKAGE))"
     environment = {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "TMPDIR": tmp_path}
     assert run(code, **environment, NUMBA_CACHE_DIR="")[0].startswith(str(tmp_path))
+
+
+HOMELESS = """
+import pwd, tempfile
+
+def nobody(number):
+    raise KeyError(number)
+
+def nowhere():
+    raise FileNotFoundError("no usable temporary directory")
+
+pwd.getpwuid, tempfile.gettempdir = nobody, nowhere
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="users without a home are of POSIX")
+@pytest.mark.parametrize("given", [True, False])
+def test_a_user_without_home_or_temporary_folder_needs_neither(given, tmp_path):
+    environment = {key: os.environ[key] for key in ("PATH",) if key in os.environ}
+    if given:
+        environment["NUMBA_CACHE_DIR"] = str(tmp_path)
+    answer = subprocess.run(
+        [sys.executable, "-c", HOMELESS + POSITIONS],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(sys.executable).parent,
+        env=environment,
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stderr.count("UserWarning") == (0 if given else 1)
+    assert bool(list(tmp_path.rglob("*.nbi"))) == given
+
+
+@pytest.fixture
+def temporary(fresh, monkeypatch, tmp_path):
+    """A temporary folder that many share, the only place for a cache."""
+    shared = tmp_path.resolve() / "tmp"
+    shared.mkdir()
+    shared.chmod(0o1777)
+    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(compiling.platformdirs, "user_cache_path", lambda name: Path("~") / name)
+    monkeypatch.setattr(compiling.tempfile, "gettempdir", lambda: str(shared))
+    return shared
+
+
+only_posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="owners and modes are of POSIX")
+
+
+@only_posix
+def test_a_cache_in_the_shared_temporary_folder_is_the_users_alone(temporary):
+    folder = Path(compiling.cache_folder(PACKAGE))
+    assert folder.parent == temporary / f"usm-gym-{os.getuid()}"
+    for each in (folder, folder.parent):
+        assert each.stat().st_mode & 0o777 == 0o700
+
+
+@only_posix
+@pytest.mark.parametrize(
+    "trap", ["link", "writable", "not sticky", "link to a cache", "owner", "owner above"]
+)
+def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_path, monkeypatch):
+    base = temporary / f"usm-gym-{os.getuid()}"
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    base.mkdir(mode=0o700)
+    if trap == "link":
+        base.rmdir()
+        base.symlink_to(elsewhere)
+    elif trap == "writable":
+        base.chmod(0o777)
+    elif trap == "not sticky":
+        temporary.chmod(0o777)
+    elif trap == "link to a cache":
+        name = Path(compiling.cache_folder(PACKAGE)).name
+        compiling.cache_folder.cache_clear()
+        (base / name).rmdir()
+        (base / name).symlink_to(elsewhere)
+    else:
+        lstat = Path.lstat
+        owned = {"owner": base, "owner above": temporary}[trap]
+
+        def other(path):
+            found = list(lstat(path))
+            found[4] = os.getuid() + 1 if path == owned else found[4]
+            return os.stat_result(found)
+
+        monkeypatch.setattr(Path, "lstat", other)
+    with pytest.warns(UserWarning, match="no safe and writable cache folder") as caught:
+        folders = [compiling.cache_folder(package) for package in (PACKAGE, PACKAGE / "plant")]
+    assert folders == [None, None]
+    assert len(caught) == 1
+    assert list(elsewhere.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def compiled_once(tmp_path_factory):
+    """A cache folder, and what was computed as it was filled."""
+    folder = tmp_path_factory.mktemp("compiled")
+    return folder, run(POSITIONS, NUMBA_CACHE_DIR=folder)[2:]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "damage"),
+    [("nbi", "truncated"), ("nbi", "garbage"), ("nbc", "truncated"), ("nbc", "empty")],
+)
+def test_a_damaged_file_of_the_cache_is_named_and_replaced(suffix, damage, compiled_once, tmp_path):
+    filled, numbers = compiled_once
+    shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
+    (damaged,) = tmp_path.rglob(f"motion.path_positions-*.{suffix}")
+    data = damaged.read_bytes()
+    kept = {"truncated": data[: len(data) // 2], "empty": b"", "garbage": bytes(len(data))}
+    damaged.write_bytes(kept[damage])
+    answer = subprocess.run(
+        [sys.executable, "-W", "always", "-c", POSITIONS],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(sys.executable).parent,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stderr.count(f"UserWarning: {damaged} is damaged") == 1
+    assert answer.stderr.count("is damaged") == 1
+    assert answer.stdout.splitlines()[2:] == numbers
+    assert damaged.read_bytes() != kept[damage]
+    assert run(POSITIONS, NUMBA_CACHE_DIR=tmp_path)[0] == "0"

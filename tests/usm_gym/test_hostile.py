@@ -9,9 +9,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
 
+import usm_gym
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
 from usm_gym.conditions import conditions_of
 from usm_gym.env import USMEnv
+from usm_gym.nominal import nominal_of
 from usm_gym.robot import robot_of
 from usm_gym.scenario import MODES
 from usm_gym.validation import QUOTED, SAID, in_one_line
@@ -197,3 +199,27 @@ def test_environments_refuse_or_are_made(arguments):
         wanted.pop(other, None)
     no, env = refused(USMEnv, **wanted)
     assert no or env.mode in MODES
+
+
+ROBOT = Robot()
+NOMINAL = nominal_of(ROBOT, Scenario())
+ARRAYS = st.one_of(ANYTHING, st.sampled_from([np.zeros(n) for n in (2, 5, 15, 16)]))
+
+
+@pytest.mark.filterwarnings("error")
+@given(arguments=st.lists(ARRAYS, min_size=5, max_size=6), form=st.one_of(st.none(), ANYTHING))
+def test_functions_for_engineers_refuse_or_answer(arguments, form):
+    options = {} if form is None else {"hydrodynamics": form}
+    refused(usm_gym.accelerations, ROBOT, *arguments, **options)
+    refused(usm_gym.linearise, arguments[0])
+    refused(usm_gym.linearise, NOMINAL, heading=arguments[1], joint_angles=arguments[2])
+    refused(usm_gym.max_error, *arguments[:3])
+    refused(usm_gym.suite, arguments[3])
+    refused(usm_gym.evaluate, Still(), arguments[4])
+
+
+class Still:
+    """A policy that gives what no action is."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return observation, state

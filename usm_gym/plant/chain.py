@@ -323,8 +323,10 @@ def accelerate(block, like, wide, stride, links, base, body):
 
 
 @compiled
-def accelerate_one(blocks, links, body):
-    """`accelerate` for the first of the blocks of one robot each."""
-    block, wide = block_at(blocks, 0, 0.0), spread(0.0)
-    base = kinematics(block, 0.0, wide, WIDTH, links, body.l)
-    accelerate(block, 0.0, wide, WIDTH, links, base, body)
+def accelerate_all(blocks, links, body):
+    """`accelerate` for blocks of one robot each."""
+    wide = spread(0.0)
+    for k in range(blocks.shape[0]):
+        block = block_at(blocks, k, 0.0)
+        base = kinematics(block, 0.0, wide, WIDTH, links, body.l)
+        accelerate(block, 0.0, wide, WIDTH, links, base, body)

@@ -59,6 +59,16 @@ class Table(NamedTuple):
 
 
 @piece
+def value(observation, table, entry, index):
+    """One number of an observation in its physical unit.
+
+    `table` has the fields `starts`, as in `Table`, and `scale`, physical value over observed value.
+    """
+    k = table.starts[entry] + index
+    return observation[k] * table.scale[k]
+
+
+@piece
 def command(row, lanes, lane, links, action):
     """Set the thruster commands of one robot from its action in [-1, 1]; beyond it saturates.
 

@@ -1,0 +1,145 @@
+"""The start and the end of a command: Ctrl-C at any time, streams that are closed or full."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from interrupts import listening
+
+USM = Path(sys.executable).with_name("usm")
+# Interrupts the process group, as a terminal does, at the first import of a module: deterministic,
+# and independent of how fast the machine is. Workers are told apart by how joblib starts them.
+SITE = """
+import os, signal, sys
+
+wanted = os.environ.get("WORKER_MOMENT" if "popen_loky" in str(sys.orig_argv) else "MOMENT")
+
+def interrupt(event, details):
+    global wanted
+    if event == "import" and details[0] == wanted:
+        wanted = None
+        os.killpg(0, signal.SIGINT)
+
+sys.addaudithook(interrupt)
+"""
+INTERRUPTING = """
+import os, signal, time
+
+class Interrupting:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        os.killpg(0, signal.SIGINT)
+        time.sleep(60)
+"""
+COMMANDS = {
+    "policies": [],
+    "evaluate": ["--policies", "sta", "--episodes", "1"],
+    "compare": ["sta", "pd", "--episodes", "1"],
+    "leaderboard": [],
+    "robustness": ["--vary", "noise"],
+    "tune": ["sta", "--trials", "2", "--output", "tuned.json"],
+    "train": ["--output", "agent"],
+    "study": ["residual", "--output", "study"],
+    "watch": ["--output", "film.mp4"],
+    "report": ["result.json", "--output", "page.html"],
+    "reproduce": [],
+    "bench": [],
+}
+# The first import after Ctrl-C is listened for, one of an extension module, and the last.
+STARTING = ("agents.main", "numpy._core._multiarray_umath", "agents.terminal")
+RUNNING = {
+    "evaluate": "scipy.stats",
+    "tune": "optuna",
+    "train": "torch",
+    "study": "agents.study",
+    "watch": "agents.film",
+    "report": "agents.report",
+}
+
+
+def interrupted(folder: Path, command: list[object], **moments: str) -> tuple[int, str]:
+    """Return status and errors of a command that is interrupted; no process of it is left then."""
+    site = folder / "site"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(SITE)
+    answer = subprocess.run(
+        listening(*command),
+        capture_output=True,  # waits until nobody holds the pipes any more
+        text=True,
+        check=False,
+        timeout=120,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(site), **moments},
+        start_new_session=True,
+    )
+    return answer.returncode, answer.stderr
+
+
+@pytest.mark.parametrize("moment", STARTING)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_ctrl_c_at_the_start(command: str, moment: str, tmp_path: Path) -> None:
+    found = interrupted(tmp_path, [USM, command, *COMMANDS[command]], MOMENT=moment)
+    assert found == (130, "usm: interrupted\n")
+
+
+@pytest.mark.parametrize("command", RUNNING)
+def test_ctrl_c_while_a_command_imports_what_it_needs(command: str, tmp_path: Path) -> None:
+    arguments = [USM, command, *COMMANDS[command]]
+    found = interrupted(tmp_path, arguments, MOMENT=RUNNING[command])
+    assert found == (130, "usm: interrupted\n")
+
+
+@pytest.mark.parametrize("package", ["usm_cli", "agents"])
+def test_ctrl_c_at_the_start_of_a_package(package: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", package, "policies"]
+    assert interrupted(tmp_path, command, MOMENT="numpy") == (130, "usm: interrupted\n")
+
+
+def test_ctrl_c_while_workers_start(tmp_path: Path) -> None:
+    command = [USM, "evaluate", "--policies", "sta,pd", "--workers", "2"]
+    assert interrupted(tmp_path, command, WORKER_MOMENT="joblib") == (130, "usm: interrupted\n")
+
+
+def test_ctrl_c_while_workers_work(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(INTERRUPTING)
+    command = [USM, "evaluate", "--policies", "mine:Interrupting,sta", "--workers", "2"]
+    assert interrupted(tmp_path, command) == (130, "usm: interrupted\n")
+
+
+def test_a_command_that_was_started_to_ignore_ctrl_c_ignores_it(tmp_path: Path) -> None:
+    command = ["sh", "-c", f"trap '' INT; {USM} policies"]
+    assert interrupted(tmp_path, command, MOMENT="agents.terminal") == (0, "")
+
+
+@pytest.mark.parametrize(("closed", "workers"), [(">&-", 1), ("2>&-", 1), ("<&- >&- 2>&-", 2)])
+def test_closed_streams_do_not_stop_a_command(closed: str, workers: int, tmp_path: Path) -> None:
+    arguments = f"evaluate --policies sta --episodes 1 --workers {workers} --output result.json"
+    answer = subprocess.run(
+        f"{USM} {arguments} {closed}",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert ("sta" in answer.stdout) == (">&-" not in closed.split())
+    assert set(json.loads((tmp_path / "result.json").read_text())["results"]) == {"sta"}
+
+
+@pytest.mark.parametrize("arguments", ["policies", "--help"])
+def test_a_full_disk_behind_the_output_is_one_line(arguments: str) -> None:
+    environment = {**os.environ}
+    environment.pop("PYTHONUNBUFFERED", None)
+    answer = subprocess.run(
+        f"{USM} {arguments} > /dev/full",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )
+    assert answer.returncode == 2
+    assert answer.stderr == "usm: error: [Errno 28] No space left on device\n"

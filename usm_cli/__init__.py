@@ -1,0 +1,1 @@
+"""The `usm` command, as it is started."""
