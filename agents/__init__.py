@@ -7,7 +7,10 @@ torch.
 import gymnasium as gym
 
 from agents.artifact import register_shipped
+from agents.residual import ResidualPolicy
 from usm_gym.scenario import MODES
+
+__all__ = ["ResidualPolicy"]
 
 for _mode in MODES:
     gym.register(

@@ -203,15 +203,22 @@ class ResidualPolicy:
 
     privileged = False
 
-    def __init__(self, residual: Residual, agent: Policy) -> None:
+    def __init__(
+        self,
+        residual: Residual | gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        agent: Policy,
+    ) -> None:
         """Join the two.
 
         Args:
-            residual: The residual task as in training.
-            agent: What was trained on it, with `predict`.
+            residual: The residual task as in training, or its environment, single or vector.
+            agent: What was trained on it, with `predict`; a model of Stable-Baselines3 will do.
+
+        Raises:
+            ValueError: If `residual` is neither.
         """
-        self.nominal, self.base = residual.nominal, residual.base
-        self._residual, self._agent = residual, agent
+        self._residual, self._agent = _task(residual), agent
+        self.nominal, self.base = self._residual.nominal, self._residual.base
 
     def predict(
         self,
@@ -231,3 +238,14 @@ class ResidualPolicy:
         action, agent_state = self._agent.predict(seen, agent_state, start, deterministic)
         command, memory = self._residual.command(memory, np.asarray(action, np.float32))
         return (command if plain.ndim == 2 else command[0]), (memory, agent_state)
+
+
+def _task(env: Any) -> Residual:
+    """The residual task of an environment, whatever it is wrapped in."""
+    inner = env
+    while not hasattr(inner, "residual") and hasattr(inner, "env"):
+        inner = inner.env
+    task = getattr(inner, "residual", inner)
+    require(isinstance(task, Residual), "residual", env, "an environment of the residual task")
+    assert isinstance(task, Residual)
+    return task

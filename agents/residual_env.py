@@ -108,7 +108,8 @@ ResidualEnv.__doc__ = (ResidualEnv.__doc__ or "").replace(
 
 
 class ResidualVectorEnv(
-    gym.vector.VectorWrapper[Array, Array, Array, Array, Any], gym.utils.RecordConstructorArgs
+    gym.vector.VectorWrapper,  # generic at run time only since Gymnasium 1.4
+    gym.utils.RecordConstructorArgs,
 ):
     """The residual task of many robots; each behaves as in `ResidualEnv`, to the bit."""
 

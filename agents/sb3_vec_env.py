@@ -144,7 +144,7 @@ class SB3VecEnv(VecEnv):
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[np.ndarray[Any, Any] | None]:
-        """The image of the one robot that is rendered, or none."""
+        """An image of each robot, or none without the render mode "rgb_array"."""
         return list(self._envs.render() or ())
 
 

@@ -1,5 +1,7 @@
 import os
+from importlib import import_module, util
 
+import pytest
 from hypothesis import settings
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of the tests appear on no screen
@@ -8,3 +10,12 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of the tests appear
 settings.register_profile("short", max_examples=25, deadline=None, derandomize=True)
 settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "short"))
+
+
+@pytest.fixture
+def checkers():
+    """The environment checkers of Gymnasium and, where it is installed, Stable-Baselines3."""
+    packages = ["gymnasium.utils"]
+    if util.find_spec("stable_baselines3"):
+        packages.append("stable_baselines3.common")
+    return [import_module(f"{package}.env_checker").check_env for package in packages]

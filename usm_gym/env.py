@@ -28,10 +28,11 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     """An underwater swimming manipulator whose centre of mass has to follow a path.
 
     Sixteen links, five thrusters. The thrusters hold the centre of mass on a slow path; in
-    operation mode (`USM-Operation-v0`) the joints meanwhile bend the head side of the body one way,
-    the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
-    (`USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the line of
-    sight. The score of an episode is the largest true position error in each axis after settling.
+    operation mode (`usm_gym:USM-Operation-v0`) the joints meanwhile bend the head side of the body
+    one way, the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
+    (`usm_gym:USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the
+    line of sight. The score of an episode is the largest true position error in each axis after
+    settling.
 
     ## Action
 
@@ -82,6 +83,8 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     | `thrust_effort` | N | mean absolute command of the thrusters |
     | `diverged` | 0 or 1 | whether the robot is lost |
 
+    All values are `numpy.float64`, which is a `float`, so that JSON takes them.
+
     ## Arguments
 
     | argument | default | meaning |
@@ -89,7 +92,7 @@ class USMEnv(gym.Env[Observation, NDArray[np.float32]]):
     | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of `Conditions` fields |
     | `robot` | the paper's | a dict of `Robot` fields |
     | `render_mode` | None | `"rgb_array"`: `render()` gives an image of 640 x 480; `"human"`: a \
-window shows every step in real time (both need the extra `render`) |
+window shows every step in real time (drawing needs the extra `render`) |
 
     ## Version history
 
@@ -110,7 +113,6 @@ window shows every step in real time (both need the extra `render`) |
 
         Raises:
             ValueError: If a condition, a field of the robot or the render mode is not allowed.
-            gymnasium.error.DependencyNotInstalled: If the render mode needs the extra `render`.
         """
         self.mode: Mode = mode_of(mode)
         self.conditions = conditions_of(conditions)
@@ -190,8 +192,13 @@ window shows every step in real time (both need the extra `render`) |
         )
 
     def render(self) -> NDArray[np.uint8] | None:
-        """An image of the present, (480, 640, 3), in the mode "rgb_array"; otherwise None."""
-        return None if self._viewer is None else self._viewer.render(self._running)
+        """An image of the present, (480, 640, 3), in the mode "rgb_array"; otherwise None.
+
+        Raises:
+            gymnasium.error.DependencyNotInstalled: Without the extra `render`.
+        """
+        images = None if self._viewer is None else self._viewer.render(self._running)
+        return None if images is None else images[0]
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -216,7 +223,7 @@ window shows every step in real time (both need the extra `render`) |
         return self._simulation
 
     def _info(self) -> dict[str, Any]:
-        return {key: values[0].item() for key, values in infos(self._running).items()}
+        return {key: values[0] for key, values in infos(self._running).items()}
 
 
 # The class docstring is the specification; its table comes from the one that the code uses.
@@ -297,7 +304,7 @@ def outcome(
 
 
 def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
-    """The info of every robot: arrays of shape (size,), views of the simulation's."""
+    """The info of every robot: float64, (size,), some of them views of the simulation's."""
     return {
         "error_x": simulation.error[:, 0],
         "error_y": simulation.error[:, 1],
@@ -305,5 +312,5 @@ def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
         "max_error_y": simulation.max_error[:, 1],
         "heading_error": simulation.heading_error,
         "thrust_effort": simulation.effort,
-        "diverged": simulation.lost.astype(np.int64),
+        "diverged": simulation.lost.astype(np.float64),
     }

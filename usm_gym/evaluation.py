@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from usm_gym import metrics, parallel
 from usm_gym.env import saturated
+from usm_gym.observation import ObservationLayout
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.simulation import Simulation
@@ -100,10 +101,12 @@ def evaluate(
 
     Args:
         policy: Anything with `predict`; it is called with a batch axis. To be pickled for more than
-            one worker. One with `privileged = True` is also given `snapshot=`, the true state.
+            one worker. One with `privileged = True` is also given `snapshot=`, the true state. What
+            was trained on the residual task goes in as `agents.ResidualPolicy(env, model)`.
         scenarios: The episodes.
         robot: The robot; without one, the paper's.
-        workers: Number of processes; without effect on the result.
+        workers: Number of processes; without effect on the result of a policy whose answer to a row
+            does not depend on the others, as that of torch does in the last bits.
         progress: Called now and then with the number of episodes done since the last call; with
             one worker, fractions of them.
 
@@ -111,7 +114,8 @@ def evaluate(
         The scores.
 
     Raises:
-        ValueError: If there is no scenario, or the policy returns what is no action.
+        ValueError: If there is no scenario, or the policy wants another observation or returns what
+            is no action.
     """
     listed = isinstance(scenarios, Sequence) and len(scenarios) > 0
     valid = listed and all(isinstance(each, Scenario) for each in scenarios)
@@ -119,6 +123,7 @@ def evaluate(
     require(is_whole(workers, 1), "workers", workers, "1 or more")
     report = progress or (lambda episodes: None)
     body = robot or Robot()
+    _require_fit(policy, body)
     for scenario in scenarios:
         score(_at_rest(scenario, body))  # refuses an episode that leaves nothing to score
     if workers == 1:
@@ -259,6 +264,19 @@ def _run(
         )
         for i, (scenario, end) in enumerate(zip(scenarios, ends, strict=True))
     ]
+
+
+def _require_fit(policy: Any, robot: Robot) -> None:
+    """Refuse a model that was trained on another observation, such as the residual task's."""
+    space = getattr(policy, "observation_space", None)
+    shape = ObservationLayout(robot.links, len(robot.thrusters)).space.shape
+    if space is not None:
+        require(
+            space.shape == shape,
+            "the shape of the policy's observation",
+            space.shape,
+            f"{shape}; a model of the residual task goes in as agents.ResidualPolicy(env, model)",
+        )
 
 
 def _at_rest(scenario: Scenario, robot: Robot) -> Trajectory:

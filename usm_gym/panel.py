@@ -117,12 +117,12 @@ def write(
 
 @lru_cache(maxsize=128)
 def _words(text: str, size: int, colour: Colour) -> pygame.Surface:
-    return _font(size).render(text, True, colour)
+    # Fonts are not kept: they die with anybody's `pygame.quit()`, surfaces do not.
+    pygame.font.init()
+    return pygame.font.Font(io.BytesIO(_typeface()), size).render(text, True, colour)
 
 
 @cache
-def _font(size: int) -> pygame.font.Font:
+def _typeface() -> bytes:
     # From memory, for a font keeps its file open.
-    file = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-    pygame.font.init()
-    return pygame.font.Font(io.BytesIO(file.read_bytes()), size)
+    return (Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf").read_bytes()

@@ -121,6 +121,10 @@ class Simulation:
         for index, scenario in enumerate(scenarios):
             self.start(index, scenario)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._share_out()  # what was one array before pickling has become two
+
     @property
     def limit(self) -> NDArray[np.float64]:
         """Thruster limits, N, (size,)."""

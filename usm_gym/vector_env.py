@@ -57,7 +57,7 @@ class VectorSnapshot:
 class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any]):
     """`num_envs` underwater swimming manipulators, each as in `USMEnv`, to the bit.
 
-    Made by `gym.make_vec("USM-Operation-v0", num_envs=256,
+    Made by `gym.make_vec("usm_gym:USM-Operation-v0", num_envs=256,
     vectorization_mode="vector_entry_point")`. Spaces, reward, start, end and info are those of
     `USMEnv` with a batch axis; robot i with seed s behaves as the single environment with seed s.
 
@@ -85,11 +85,12 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             mode: "operation" or "torpedo".
             conditions: As of `USMEnv`.
             robot: As of `USMEnv`.
-            render_mode: As of `USMEnv`, of one robot.
+            render_mode: As of `USMEnv`: "rgb_array" gives an image of each robot, "human" shows one
+                robot in a window.
             autoreset_mode: What happens to a robot whose episode has ended.
             threads: How many threads share a step, at most one per core; without effect on its
                 result.
-            render_index: Which robot is rendered.
+            render_index: Which robot the window shows.
 
         Raises:
             ValueError: If an argument is not allowed.
@@ -118,7 +119,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             "render_fps": render_fps(self.conditions),
             "autoreset_mode": self.autoreset_mode,
         }
-        self._viewer = None if render_mode is None else Viewer(render_mode, render_index)
+        self._viewer = None if render_mode is None else Viewer(render_mode, num_envs, render_index)
         self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
         self.single_observation_space = self.layout.space
         self.single_action_space = action_space(self.robot)
@@ -220,12 +221,15 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             stream.bit_generator.state = state
         self._done = snapshot.done.copy()
 
-    def render(self) -> tuple[NDArray[np.uint8]] | None:
-        """An image of the robot `render_index` in a tuple, in the mode "rgb_array"; else None."""
-        if self._viewer is None:
-            return None
-        frame = self._viewer.render(self.simulation)
-        return None if frame is None else (frame,)
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """An image of each robot, (480, 640, 3), in the mode "rgb_array"; otherwise None.
+
+        Each takes about 10 ms to draw and 0.9 MB.
+
+        Raises:
+            gymnasium.error.DependencyNotInstalled: Without the extra `render`.
+        """
+        return None if self._viewer is None else self._viewer.render(self.simulation)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""

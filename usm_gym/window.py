@@ -16,11 +16,9 @@ class Window:
 
     def __init__(self, size: tuple[int, int], title: str) -> None:
         """Open it."""
-        if not pygame.display.get_init():
-            pygame.display.init()
-        self._window = pygame.Window(title, size)
+        self._size, self._title = size, title
         self._clock = pygame.time.Clock()
-        _windows.add(self._window)
+        self._open()
 
     @property
     def closed(self) -> bool:
@@ -29,6 +27,9 @@ class Window:
 
     def show(self, frame: NDArray[np.uint8], fps: float) -> None:
         """Show a frame, (height, width, 3), no earlier than 1 / fps seconds after the last."""
+        if not self.closed and _is_dead(self._window):
+            _windows.remove(self._window)
+            self._open()
         for event in pygame.event.get():
             if event.type == pygame.WINDOWCLOSE or (
                 event.type == pygame.KEYDOWN and event.key in (pygame.K_ESCAPE, pygame.K_q)
@@ -45,6 +46,12 @@ class Window:
         """Close it, and with the last one the connection to the display."""
         _close(self._window)
 
+    def _open(self) -> None:
+        if not pygame.display.get_init():
+            pygame.display.init()
+        self._window = pygame.Window(self._title, self._size)
+        _windows.add(self._window)
+
 
 _windows: set[pygame.Window] = set()
 
@@ -57,6 +64,14 @@ def has_display() -> bool:
     finally:
         if not _windows:
             pygame.display.quit()
+
+
+def _is_dead(window: pygame.Window) -> bool:
+    """Whether somebody's `pygame.quit()` has taken it away."""
+    try:
+        return not window.id
+    except pygame.error:
+        return True
 
 
 def _close(window: pygame.Window | None) -> None:

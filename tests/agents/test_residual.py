@@ -1,5 +1,6 @@
 """The residual task: its base to the bit, saturation once, single as vector, and what is seen."""
 
+import dataclasses
 import subprocess
 import sys
 import warnings
@@ -8,9 +9,8 @@ import gymnasium as gym
 import laws
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
-from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
+import agents
 import baselines
 import usm_gym
 from agents.residual import Residual, ResidualPolicy
@@ -34,8 +34,8 @@ def vector(count, **arguments):
     return gym.make_vec(ID, num_envs=count, vectorization_mode="vector_entry_point", **arguments)
 
 
-def test_checkers_have_no_complaint():
-    for check in (check_env, check_env_sb3):
+def test_checkers_have_no_complaint(checkers):
+    for check in checkers:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             # The wrapper is the environment here; unwrapping it would check the plain one.
@@ -88,6 +88,28 @@ def test_a_zero_residual_scores_as_the_base():
     base = usm_gym.evaluate(baselines.make("sta", nominal), scenarios)
     for name, values in base.per_episode.items():
         assert (ours.per_episode[name] == values).all()
+
+
+def test_a_model_of_the_task_is_scored_with_its_base():
+    stable_baselines3 = pytest.importorskip("stable_baselines3")
+    env = gym.make(ID)
+    model = stable_baselines3.PPO("MlpPolicy", env, seed=0, device="cpu")
+    scenario = dataclasses.replace(usm_gym.suite("operation")[0], duration=1.0, settle_time=0.2)
+    seen, info = env.reset(options={"scenario": scenario})
+    truncated = False
+    while not truncated:
+        action, _ = model.predict(seen, deterministic=True)
+        seen, _, _, truncated, info = env.step(action)
+    for task in (env, vector(2), vector(2).residual):
+        scores = usm_gym.evaluate(agents.ResidualPolicy(task, model), [scenario] * 2)
+        for axis in "xy":
+            expected = [info[f"max_error_{axis}"]] * 2
+            # The network's last bits depend on how many robots it acts for.
+            np.testing.assert_allclose(scores.per_episode[f"max_error_{axis}"], expected, rtol=1e-3)
+    with pytest.raises(ValueError, match=r"is \(44,\); allowed: \(90,\); .* agents.ResidualPolicy"):
+        usm_gym.evaluate(model, [scenario])
+    with pytest.raises(ValueError, match="allowed: an environment of the residual task"):
+        agents.ResidualPolicy(env.unwrapped, model)
 
 
 @pytest.mark.parametrize("autoreset_mode", ["NextStep", "SameStep"])

@@ -1,12 +1,15 @@
 """Pictures: what they say of the simulation, what is drawn of them, and what is left behind."""
 
+import copy
 import dataclasses
 import gc
 import os
+import pickle
 import sys
 
 import gymnasium as gym
 import numpy as np
+import pygame
 import pytest
 
 import baselines
@@ -14,9 +17,14 @@ import usm_gym
 from usm_gym import rendering
 from usm_gym.picture import Recorder
 from usm_gym.rendering import HEAD, JET_CORE, REFERENCE, SCENE, TAIL, TRAIL, Canvas
-from usm_gym.window import _windows
+from usm_gym.window import Window, _windows
 
-ID = "USM-Operation-v0"
+ID = "usm_gym:USM-Operation-v0"
+RESIDUAL = "agents:USM-OperationResidual-v0"
+
+
+def vector(count, id=ID, **arguments):
+    return gym.make_vec(id, num_envs=count, vectorization_mode="vector_entry_point", **arguments)
 
 
 def episode(steps, policy="sta", render_mode="rgb_array", scenario="nominal", **arguments):
@@ -42,7 +50,7 @@ def places(frame, colour, tolerance=6):
 def test_a_picture_is_the_simulations():
     env, positions = episode(560)
     simulation = env.unwrapped.simulation
-    recorder = env.unwrapped._viewer._recorder
+    (recorder,) = env.unwrapped._viewer._recorders
     picture = recorder.picture(simulation)
     theta = simulation.theta[0]
     assert picture.time == pytest.approx(11.2)
@@ -136,27 +144,41 @@ def test_a_restored_episode_has_no_trail_that_it_was_not_seen_to_leave():
     snapshot = env.unwrapped.snapshot()
     other, _ = episode(2)
     other.unwrapped.restore(snapshot)
-    picture = other.unwrapped._viewer._recorder.picture(other.unwrapped.simulation)
+    picture = other.unwrapped._viewer._recorders[0].picture(other.unwrapped.simulation)
     assert picture.instants.tolist() == [40]
     assert other.render().shape == (480, 640, 3)
 
 
-def test_a_vector_environment_shows_the_chosen_robot():
-    envs = gym.make_vec(
-        ID,
-        num_envs=3,
-        vectorization_mode="vector_entry_point",
-        render_mode="rgb_array",
-        render_index=2,
-    )
+@pytest.mark.parametrize("id", [ID, RESIDUAL])
+def test_a_vector_environment_gives_an_image_of_each_robot(id):
+    envs = vector(3, id, render_mode="rgb_array")
+    singles = [gym.make(id, render_mode="rgb_array") for _ in range(3)]
+    envs.reset(seed=5)
+    for seed, env in enumerate(singles, 5):
+        env.reset(seed=seed)
+    size = envs.single_action_space.shape
+    for actions in np.random.default_rng(1).uniform(-1, 1, (30, 3, *size)).astype(np.float32):
+        envs.step(actions)
+        for env, action in zip(singles, actions, strict=True):
+            env.step(action)
+    for _ in range(2):
+        frames = envs.render()
+        assert len(frames) == 3
+        for frame, env in zip(frames, singles, strict=True):
+            assert (frame == env.render()).all()
+    envs.close()
+
+
+def test_a_window_shows_the_chosen_robot_of_a_vector(monkeypatch):
+    shown = []
+    monkeypatch.setattr(Window, "show", lambda window, frame, fps: shown.append(frame))
+    envs = vector(3, render_mode="human", render_index=2)
     single = gym.make(ID, render_mode="rgb_array")
-    envs.reset(seed=[5, 6, 7])
+    envs.reset(seed=5)
     single.reset(seed=7)
-    for action in np.random.default_rng(1).uniform(-1, 1, (30, 3, 5)).astype(np.float32):
-        envs.step(action)
-        single.step(action[2])
-    (frame,) = envs.render()
-    assert (frame == single.render()).all()
+    assert envs.render() is None
+    assert len(shown) == 2
+    assert (shown[-1] == single.render()).all()
     envs.close()
     with pytest.raises(ValueError, match="render_index is 3; allowed: 0 to 2"):
         usm_gym.vector_env.USMVectorEnv(3, "operation", render_index=3)
@@ -164,13 +186,11 @@ def test_a_vector_environment_shows_the_chosen_robot():
 
 def test_an_episode_after_another_starts_a_trail_of_its_own():
     scenario = dataclasses.replace(usm_gym.suite("operation")[0], duration=0.2, settle_time=0.1)
-    envs = gym.make_vec(
-        ID, num_envs=1, vectorization_mode="vector_entry_point", render_mode="rgb_array"
-    )
+    envs = vector(1, render_mode="rgb_array")
     envs.reset(options={"scenario": scenario})
     for _ in range(13):  # ten steps, the reset, two steps
         envs.step(np.zeros((1, 5), np.float32))
-    picture = envs._viewer._recorder.picture(envs.simulation)
+    picture = envs._viewer._recorders[0].picture(envs.simulation)
     assert picture.instants.tolist() == [0, 1, 2]
 
 
@@ -181,8 +201,6 @@ def test_the_frame_rate_is_the_control_rate():
 
 
 def test_a_window_that_is_closed_by_hand_ends_nothing():
-    import pygame
-
     others = set(_windows)
     env, _ = episode(2, render_mode="human")
     assert env.render() is None
@@ -216,12 +234,72 @@ def test_a_hundred_environments_leave_nothing_behind(render_mode):
     assert left() == before
 
 
-def test_without_pygame_one_line_names_the_extra(monkeypatch):
+def test_without_pygame_all_but_drawing_works(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     monkeypatch.delitem(sys.modules, "usm_gym.rendering")
+    env = gym.make(ID, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.step(np.zeros(5, np.float32))
     with pytest.raises(gym.error.DependencyNotInstalled) as caught:
-        gym.make(ID, render_mode="rgb_array")
+        env.render()
     assert str(caught.value) == (
         "render_mode='rgb_array' needs pygame: pip install 'usm-gym[render]'"
     )
-    gym.make(ID).reset(seed=0)
+    with pytest.raises(gym.error.DependencyNotInstalled, match="render_mode='human' needs pygame"):
+        gym.make(ID, render_mode="human").reset(seed=0)
+
+
+@pytest.mark.parametrize("quit", [pygame.quit, pygame.font.quit])
+def test_rendering_outlives_anybodys_quit(quit):
+    env, _ = episode(3)
+    frame = env.render()
+    quit()
+    assert (env.render() == frame).all()  # the words were drawn before
+    env.step(np.zeros(5, np.float32))
+    env.render()  # a new word: the time
+
+
+def test_a_window_outlives_anybodys_quit():
+    others = set(_windows)
+    env, _ = episode(2, render_mode="human")
+    for again in (lambda: None, pygame.display.init):
+        (old,) = _windows - others
+        pygame.quit()
+        again()
+        env.step(np.zeros(5, np.float32))
+        (window,) = _windows - others
+        assert window is not old
+        assert window.title == "usm-gym"
+    env.close()
+    assert _windows == others
+
+
+@pytest.mark.parametrize("render_mode", [None, "human", "rgb_array"])
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda **mode: gym.make(ID, **mode),
+        lambda **mode: gym.make(RESIDUAL, **mode),
+        lambda **mode: vector(3, **mode),
+        lambda **mode: vector(3, RESIDUAL, **mode),
+    ],
+    ids=["single", "residual", "vector", "residual vector"],
+)
+def test_a_copy_goes_on_as_the_original(make, copied, render_mode):
+    env = make(render_mode=render_mode)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    env.step(env.action_space.sample())
+    env.render()
+    other = copied(env)
+    for _ in range(3):
+        action = env.action_space.sample()
+        for ours, theirs in zip(env.step(action), other.step(action), strict=True):
+            np.testing.assert_equal(ours, theirs)
+    np.testing.assert_equal(env.render(), other.render())
+    first, second = (each.unwrapped.simulation for each in (env, other))
+    np.testing.assert_equal(first.theta, second.theta)
+    np.testing.assert_equal(first.snapshot().arrays, second.snapshot().arrays)
+    env.close()
+    other.close()
