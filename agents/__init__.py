@@ -8,7 +8,7 @@ import sys
 
 if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)] == "agents":
     # `python -m agents` imports this package before its __main__.py, which listens to Ctrl-C.
-    from usm_cli.main import listen
+    from usm_cli.interrupts import listen
 
     listen()
 
