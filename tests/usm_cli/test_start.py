@@ -33,6 +33,19 @@ class Interrupting:
         os.killpg(0, signal.SIGINT)
         time.sleep(60)
 """
+SWALLOWING = """
+import os, signal, time
+
+try:
+    os.killpg(0, signal.SIGINT)
+    time.sleep(0)
+except BaseException:
+    pass
+
+class Waiting:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        time.sleep(200)
+"""
 COMMANDS = {
     "policies": [],
     "evaluate": ["--policies", "sta", "--episodes", "1"],
@@ -49,13 +62,12 @@ COMMANDS = {
 }
 # The first import after Ctrl-C is listened for, one of an extension module, and the last.
 STARTING = ("agents.main", "numpy._core._multiarray_umath", "agents.terminal")
+# What a command imports when it is known, and after which it has much to do.
 RUNNING = {
-    "evaluate": "scipy.stats",
     "tune": "optuna",
     "train": "torch",
-    "study": "agents.study",
+    "study": "agents.study.figures",
     "watch": "agents.film",
-    "report": "agents.report",
 }
 
 
@@ -88,6 +100,12 @@ def test_ctrl_c_at_the_start(command: str, moment: str, tmp_path: Path) -> None:
 def test_ctrl_c_while_a_command_imports_what_it_needs(command: str, tmp_path: Path) -> None:
     arguments = [USM, command, *COMMANDS[command]]
     found = interrupted(tmp_path, arguments, MOMENT=RUNNING[command])
+    assert found == (130, "usm: interrupted\n")
+
+
+def test_ctrl_c_is_not_lost_in_a_module_that_swallows_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(SWALLOWING)
+    found = interrupted(tmp_path, [USM, "evaluate", "--policies", "mine:Waiting"])
     assert found == (130, "usm: interrupted\n")
 
 
