@@ -145,11 +145,11 @@ def fingerprint(*packages: str) -> str:
     for package in ("numba", "numpy", "scipy"):
         digest.update(version(package).encode())
     for package in sorted(set(packages)):
-        (folder,) = sys.modules[package].__path__
-        for file in sorted(Path(folder).rglob("*")):
-            if file.is_file() and "__pycache__" not in file.parts:
-                digest.update(file.relative_to(folder).as_posix().encode() + b"\0")
-                digest.update(file.read_bytes())
+        for folder in sys.modules[package].__path__:  # a namespace package has several
+            for file in sorted(Path(folder).rglob("*")):
+                if file.is_file() and "__pycache__" not in file.parts:
+                    digest.update(file.relative_to(folder).as_posix().encode() + b"\0")
+                    digest.update(file.read_bytes())
     return digest.hexdigest()
 
 

@@ -76,6 +76,9 @@ def check_writable(path: str | Path) -> None:
         raise IsADirectoryError(f"cannot write {target}: it is a directory")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"cannot write {target}: there is no directory {target.parent}")
+    # A device would be replaced by the file.
+    if target.exists() and not target.is_file():
+        raise OSError(f"cannot write {target}: it is there, and no regular file")
     try:
         with tempfile.NamedTemporaryFile(dir=target.parent):
             pass
@@ -221,7 +224,8 @@ def _remove_dead_parts(target: Path) -> None:
     pattern = f"{glob.escape(target.stem)}.part????????{glob.escape(target.suffix)}"
     for part in target.parent.glob(pattern):
         with suppress(OSError):
-            handle = os.open(part, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
+            flags = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+            handle = os.open(part, os.O_RDWR | flags)
             try:
                 if lock_descriptor(handle, blocking=False):
                     part.unlink()  # while it is locked, so that nobody begins to write it

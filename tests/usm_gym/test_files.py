@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from usm_gym.files import holding, read_bytes, read_json, replacing, write_text
+from usm_gym.files import check_writable, holding, read_bytes, read_json, replacing, write_text
 
 
 def test_a_pipe_or_a_device_is_refused_at_once(tmp_path):
@@ -26,6 +26,14 @@ def test_a_link_is_refused_where_none_is_allowed(tmp_path):
     assert read_json(link) == {}
     with pytest.raises(ValueError, match="symbolic link"):
         read_json(link, links=False)
+
+
+def test_a_pipe_or_a_device_is_not_replaced(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (pipe, "/dev/null"):
+        with pytest.raises(OSError, match="no regular file"):
+            check_writable(path)
 
 
 def test_a_large_file_is_refused_unread(tmp_path):
