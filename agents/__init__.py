@@ -1,16 +1,8 @@
-"""Learned residual thrust on top of the scripted policies, and the `usm` command.
+"""Learned residual thrust on top of the scripted policies, and the commands of `usm`.
 
 Importing this package registers the residual tasks and the shipped agents; it does not import
 torch.
 """
-
-import sys
-
-if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)] == "agents":
-    # `python -m agents` imports this package before its __main__.py, which listens to Ctrl-C.
-    from usm_cli.main import listen
-
-    listen()
 
 import gymnasium as gym
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,12 +26,13 @@ from agents.residual import ActionKind, Frames, Residual, ResidualPolicy, Residu
 from baselines.contender import Contender, fingerprint
 from baselines.gains import Gain
 from baselines.registry import make, register
-from usm_gym.files import read_bytes, read_json, write_bytes, write_json
+from usm_gym.files import read_bytes, read_json, sync_folder, write_bytes, write_json
 from usm_gym.nominal import Nominal
 from usm_gym.scenario import Mode
 from usm_gym.validation import CONFIG, in_one_line, require
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
+NEW_WEIGHTS = "policy.new.safetensors"  # for the moment between writing them and moving them
 RECURRENCE = "recurrence_"  # begins the names of its arrays
 LARGEST_WEIGHTS = 256 * 2**20  # bytes
 PRETRAINED = Path(__file__).with_name("pretrained")
@@ -84,7 +87,11 @@ _ADAPTER = TypeAdapter(Agent)
 
 
 def write_agent(folder: Path, description: Mapping[str, Any], network: Network) -> None:
-    """Write an agent; `description` has the fields of `Agent`, less those of the network."""
+    """Write an agent; `description` has the fields of `Agent`, less those of the network.
+
+    Whoever reads meanwhile, or after a kill, finds the old agent or the new one: which it is, the
+    description decides, by the hash of the weights that it means.
+    """
     arrays: dict[str, NDArray[np.float32]] = {}
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[f"weight_{k}"], arrays[f"bias_{k}"] = weight, bias
@@ -98,8 +105,10 @@ def write_agent(folder: Path, description: Mapping[str, Any], network: Network) 
         weights=hashlib.sha256(data).hexdigest(),
     )
     folder.mkdir(parents=True, exist_ok=True)
-    write_bytes(folder / WEIGHTS, data)
+    write_bytes(folder / NEW_WEIGHTS, data)
     write_json(folder / DESCRIPTION, _ADAPTER.dump_python(agent, mode="json"))
+    os.replace(folder / NEW_WEIGHTS, folder / WEIGHTS)
+    sync_folder(folder)
 
 
 def read_agent(folder: Path) -> tuple[Agent, Network]:
@@ -109,13 +118,12 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
         ValueError: If the folder holds no agent, or one that was changed or cut short.
         OSError: If it cannot be read.
     """
-    try:
-        agent = _ADAPTER.validate_python(read_json(folder / DESCRIPTION, links=False))
-    except ValueError as error:
-        raise ValueError(f"{folder / DESCRIPTION} is no agent: {in_one_line(error)}") from error
-    data = read_bytes(folder / WEIGHTS, LARGEST_WEIGHTS, links=False)
-    found = hashlib.sha256(data).hexdigest()
-    require(found == agent.weights, f"SHA-256 of {folder / WEIGHTS}", found, agent.weights)
+    agent = _description(folder)
+    while (data := _weights(folder, agent.weights)) is None:
+        before, agent = agent, _description(folder)
+        if agent == before:  # it was not written anew while it was read
+            found = hashlib.sha256(_read_weights(folder / WEIGHTS)).hexdigest()
+            require(False, f"SHA-256 of {folder / WEIGHTS}", found, agent.weights)
     try:
         return agent, _network(agent, load(data))
     except KeyError as error:  # a type of numbers, or the name of an array
@@ -124,6 +132,27 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
         ) from error
     except (SafetensorError, TypeError, ValueError) as error:
         raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
+
+
+def _description(folder: Path) -> Agent:
+    try:
+        return _ADAPTER.validate_python(read_json(folder / DESCRIPTION, links=False))
+    except ValueError as error:
+        raise ValueError(f"{folder / DESCRIPTION} is no agent: {in_one_line(error)}") from error
+
+
+def _weights(folder: Path, expected: str) -> bytes | None:
+    """The weights that are meant, wherever `write_agent` has them at the moment."""
+    for name in (WEIGHTS, NEW_WEIGHTS, WEIGHTS):
+        with suppress(FileNotFoundError):
+            data = _read_weights(folder / name)
+            if hashlib.sha256(data).hexdigest() == expected:
+                return data
+    return None
+
+
+def _read_weights(file: Path) -> bytes:
+    return read_bytes(file, LARGEST_WEIGHTS, links=False)
 
 
 def _network(agent: Agent, arrays: dict[str, NDArray[np.float32]]) -> Network:

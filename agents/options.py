@@ -44,7 +44,12 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
     """Add the options that say on what to compute."""
     add = parser.add_argument
     add("--workers", type=int, metavar="N", help="processes (default: 1; of a cluster: all)")
-    add("--cluster", metavar="ADDRESS", help="a Ray cluster to compute on (the extra `cluster`)")
+    add(
+        "--cluster",
+        metavar="ADDRESS",
+        help="a Ray cluster of your own to compute on (the extra `cluster`); Ray runs the code of "
+        "whoever reaches it",
+    )
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from pydantic.dataclasses import dataclass
 from agents.algorithms import CLASSES
 from agents.residual import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.conditions import FIELD, Conditions
-from usm_gym.files import write_json
+from usm_gym.files import read_bytes, write_json
 from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.validation import CONFIG, Count, in_one_line, require
 
@@ -128,7 +128,7 @@ def read_plan(folder: Path) -> Plan:
         ValueError: If the folder holds none.
     """
     try:
-        return _PLAN.validate_json((folder / PLAN).read_bytes())
+        return _PLAN.validate_json(read_bytes(folder / PLAN))
     except (OSError, ValueError) as error:
         raise ValueError(f"{folder} holds no training: {in_one_line(error)}") from error
 

@@ -1,23 +1,18 @@
 """Training of an agent on the residual task, from top to bottom.
 
-An interrupted training goes on from its last checkpoint as if nothing had happened, to the bit.
-Checkpoints are Stable-Baselines3's files and pickles: for one's own machine, not to be passed on.
-What is passed on is the agent (`agents.artifact`).
+A training that is interrupted, at whatever instruction, goes on from its last checkpoint as if
+nothing had happened, to the bit, and ends with the same files (`agents.checkpoint`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-import pickle
-import random
-import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -32,7 +27,15 @@ from agents.algorithms import (
     make_model,
     network_of,
 )
-from agents.artifact import write_agent
+from agents.checkpoint import (
+    Point,
+    State,
+    latest_checkpoint,
+    read_checkpoint,
+    show,
+    traces,
+    write_checkpoint,
+)
 from agents.plan import TEST_EPISODES, TEST_SEED, Plan, write_plan
 from agents.residual import ResidualPolicy
 from agents.residual_env import ResidualVectorEnv
@@ -41,13 +44,12 @@ from agents.selection import unseen
 from baselines.scoring import shared_nominal
 from usm_gym.conditions import FIELD
 from usm_gym.evaluation import evaluate
-from usm_gym.files import write_json
+from usm_gym.files import holding
 from usm_gym.provenance import provenance
 from usm_gym.robot import Robot
 from usm_gym.seeding import TRAINING, VALIDATION, stream
 from usm_gym.validation import require
 
-CURVE, STATE, MODEL, REPLAY = "curve.json", "state", "model.zip", "replay"
 # Held-out scenarios of the training distribution, the same for all trainings.
 VALIDATION_EPISODES = 32
 # A training has diverged when so many validations in a row are so many times worse than the best.
@@ -64,23 +66,37 @@ class DivergedError(ValueError):
     """A training that has diverged."""
 
 
-def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
+def train(plan: Plan, folder: Path, report: Report, resume: bool = False) -> list[Point]:
     """Train an agent, or go on training it, and leave the best one in the folder.
 
     Args:
         plan: What to train.
         folder: Where plan, learning curve, checkpoints and agent are kept.
         report: Called now and then with the steps done and a line on the last validation.
+        resume: Whether to go on with the training in the folder. Its checkpoint is code, which is
+            run; without this, nothing in the folder is opened.
 
     Returns:
         The learning curve: what each validation found.
 
     Raises:
+        ValueError: If the folder holds anything of a training and none is to be resumed, or if its
+            checkpoint cannot be read.
         DivergedError: If the training diverges; its checkpoints are kept.
+        BlockingIOError: If another process trains there.
     """
     # With one thread, sums are added in the same order on every machine.
     torch.set_num_threads(1)
-    write_plan(plan, folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with holding(folder):
+        found = [] if resume else traces(folder)
+        name = f"what is in {folder} already"
+        require(not found, name, ", ".join(found), "nothing of a training, or --resume")
+        write_plan(plan, folder)
+        return _train(plan, folder, report)
+
+
+def _train(plan: Plan, folder: Path, report: Report) -> list[Point]:
     envs = gym.make_vec(
         plan.env,
         num_envs=ROBOTS[plan.algorithm],
@@ -95,9 +111,9 @@ def train(plan: Plan, folder: Path, report: Report) -> list[dict[str, Any]]:
     keeper = Keeper(plan, folder, envs, face, report)
     checkpoint = latest_checkpoint(folder)
     model = begin(plan, face) if checkpoint is None else keeper.resume(checkpoint)
-    model.set_logger(configure(str(folder), ["tensorboard"]))
     remaining = plan.steps - model.num_timesteps
     if remaining > 0:
+        model.set_logger(configure(str(folder), ["tensorboard"]))
         try:
             model.learn(remaining, callback=keeper, reset_num_timesteps=checkpoint is None)
         except ValueError:
@@ -151,9 +167,9 @@ class Keeper(BaseCallback):
         self._next = 0
         self._line = ""
         self._began, self._seconds = time.monotonic(), 0.0
-        self._best: Any = None
+        self._best: Any = None  # a point of the curve, and the network that was validated there
         self._scores: dict[str, Any] = {}
-        self.curve: list[dict[str, Any]] = []
+        self.curve: list[Point] = []
 
     def _on_rollout_start(self) -> None:
         self.check_weights(self.model)
@@ -161,7 +177,7 @@ class Keeper(BaseCallback):
         if self.num_timesteps >= self._next:
             self._next = self.num_timesteps + self._plan.interval
             self._validate()
-            self._write_checkpoint()
+            self._keep()
 
     def _on_step(self) -> bool:
         return True
@@ -170,7 +186,7 @@ class Keeper(BaseCallback):
         self.check_weights(self.model)
         self._validate()
         self._test()
-        self._write_checkpoint()
+        self._keep()
 
     def check_weights(self, model: BaseAlgorithm) -> None:
         """Stop if a weight has grown out of all bounds, or is no longer a number.
@@ -182,22 +198,14 @@ class Keeper(BaseCallback):
             raise self._diverged(model.num_timesteps, f"a weight is beyond {LARGEST_WEIGHT:g}")
 
     def resume(self, checkpoint: Path) -> BaseAlgorithm:
-        """Load the model of a checkpoint and put everything else back as it was."""
-        cls = CLASSES[self._plan.algorithm]
-        model = cls.load(checkpoint / MODEL, env=self._face, device="cpu", force_reset=False)
-        if (checkpoint / REPLAY).exists():
-            model.load_replay_buffer(checkpoint / REPLAY, truncate_last_traj=False)  # type: ignore[attr-defined]
-        state = pickle.loads((checkpoint / STATE).read_bytes())
-        if state["memory"] is not None:
-            model._last_lstm_states = state["memory"]  # type: ignore[attr-defined]
-        self._face.restore(state["envs"])
-        self.curve, self._best = state["curve"], state["best"]
+        """Load the model of a checkpoint, which is code, and put everything else back as it was."""
+        model, state = read_checkpoint(checkpoint, CLASSES[self._plan.algorithm], self._face)
+        show(self._folder, state)  # in case the training was killed before it had done so
+        self._face.restore(state.envs)
+        self.curve, self._best = state.curve, state.best
         self._seconds = self.curve[-1]["seconds"]
         self._next = model.num_timesteps + self._plan.interval
         self._line = _line(self.curve[-1])
-        random.setstate(state["python"])
-        np.random.set_state(state["numpy"])  # noqa: NPY002 (where SB3 draws from)
-        torch.set_rng_state(state["torch"])
         return model
 
     def _validate(self) -> None:
@@ -238,38 +246,18 @@ class Keeper(BaseCallback):
         where = f"the last checkpoint is {kept}" if kept else "there is no checkpoint"
         return DivergedError(f"the training has diverged after {steps} steps: {reason}; {where}")
 
-    def _write_checkpoint(self) -> None:
-        part = self._folder / "checkpoint.part"
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir()
-        self.model.save(part / MODEL)
-        if hasattr(self.model, "save_replay_buffer"):
-            with open(part / REPLAY, "wb") as file:
-                self.model.save_replay_buffer(file)
-        state = {
-            "envs": self._face.snapshot(),
-            "memory": getattr(self.model, "_last_lstm_states", None),
-            "curve": self.curve,
-            "best": self._best,
-            "python": random.getstate(),
-            "numpy": np.random.get_state(),  # noqa: NPY002
-            "torch": torch.get_rng_state(),
-        }
-        (part / STATE).write_bytes(pickle.dumps(state))
-        done = self._folder / f"checkpoint-{self.num_timesteps:010d}"
-        shutil.rmtree(done, ignore_errors=True)
-        part.rename(done)
-        for other in checkpoints(self._folder)[:-1]:
-            shutil.rmtree(other)
-        write_json(self._folder / CURVE, self.curve)
-        self._write_agent()
+    def _keep(self) -> None:
+        state = State(self._face.snapshot(), self.curve, self._best, self._description())
+        write_checkpoint(self._folder, self.model, state)
+        show(self._folder, state)
 
-    def _write_agent(self) -> None:
-        plan, (point, network) = self._plan, self._best
+    def _description(self) -> dict[str, Any]:
+        """What the best agent is, as `write_agent` takes it."""
+        plan, (point, _) = self._plan, self._best
         recorded = plan.record()
         residual = self._envs.residual
         gains = getattr(residual.base, "gains", None)
-        description = {
+        return {
             "summary": f"{plan.algorithm.upper()} residual on {plan.base}",
             "mode": plan.mode,
             "conditions": recorded["conditions"],
@@ -290,24 +278,12 @@ class Keeper(BaseCallback):
             },
             "scores": {"validation": point, **self._scores},
         }
-        write_agent(self._folder, description, network)
 
 
-def checkpoints(folder: Path) -> list[Path]:
-    """Complete checkpoints, the latest last."""
-    return sorted(folder.glob("checkpoint-*"))
-
-
-def latest_checkpoint(folder: Path) -> Path | None:
-    """The last complete checkpoint, if there is one."""
-    found = checkpoints(folder)
-    return found[-1] if found else None
-
-
-def _error(point: dict[str, Any]) -> float:
+def _error(point: Point) -> float:
     return float(point["max_error_x"] + point["max_error_y"])
 
 
-def _line(point: dict[str, Any]) -> str:
+def _line(point: Point) -> str:
     x, y = (1e3 * point[f"max_error_{axis}"] for axis in "xy")
     return f"{x:.2f} / {y:.2f} mm at {point['thrust_variation']:.0f} N/s"

@@ -11,6 +11,7 @@ import json
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,16 +20,18 @@ from types import FrameType
 from typing import Any, NoReturn
 
 import numpy as np
+from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from baselines.contender import Contender
 from baselines.policy import Policy
 from usm_gym import parallel
-from usm_gym.evaluation import Evaluation, evaluate, joined
-from usm_gym.files import write_json
+from usm_gym.evaluation import METRICS, Evaluation, evaluate, joined
+from usm_gym.files import read_json, write_json
 from usm_gym.nominal import Nominal, nominal_of
 from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
-from usm_gym.validation import in_one_line, require
+from usm_gym.validation import CONFIG, Number, Switch, in_one_line, require
 
 # Episodes that a policy meets side by side; a multiple of the plant's lanes.
 BATCH = 64
@@ -95,6 +98,18 @@ def shared_nominal(robot: Robot, scenarios: Sequence[Scenario]) -> Nominal:
     return nominal
 
 
+@pydantic_dataclass(frozen=True, config=CONFIG)
+class _Kept:
+    """What a file of scores says."""
+
+    policy: str
+    per_episode: dict[str, list[Number]]
+    failed: list[Switch]
+
+
+_KEPT = TypeAdapter(_Kept)
+
+
 def score_all(
     tasks: Sequence[Task],
     workers: int = 1,
@@ -107,7 +122,8 @@ def score_all(
         tasks: The tasks.
         workers: Number of processes; without effect on the result.
         cache: Folder in which the scores of a task are looked for, and kept when it is done; there
-            are none of refused policies, nor of those whose code is not known.
+            are none of refused policies, nor of those whose code is not known. A file that is
+            damaged is written anew, after a warning.
         progress: Called with the number of episodes done since the last call.
 
     Returns:
@@ -215,13 +231,21 @@ def _whole(parts: Sequence[Evaluation | Refusal]) -> Evaluation | Refusal:
 
 
 def _read(cache: Path | None, task: Task) -> Evaluation | None:
-    if cache is None or task.key is None or not (file := cache / f"{task.key}.json").is_file():
+    """The scores of a task that are kept; none, and a warning, if they are not what was written."""
+    if cache is None or task.key is None or not (file := cache / f"{task.key}.json").exists():
         return None
-    data = json.loads(file.read_text(encoding="utf-8"))
-    return Evaluation(
-        per_episode={name: np.array(values) for name, values in data["per_episode"].items()},
-        failed=np.array(data["failed"]),
-    )
+    try:
+        kept = _KEPT.validate_python(read_json(file))
+        names, episodes = list(kept.per_episode), len(task.scenarios)
+        require(names == list(METRICS), "per_episode", names, ", ".join(METRICS))
+        lengths = {len(kept.failed), *map(len, kept.per_episode.values())}
+        require(lengths == {episodes}, "number of episodes", sorted(lengths), str(episodes))
+    except (ValueError, OSError) as error:
+        reason = f"{file} is damaged, and the scores are computed again: {in_one_line(error)}"
+        warnings.warn(reason, stacklevel=3)
+        return None
+    scores = {name: np.array(values) for name, values in kept.per_episode.items()}
+    return Evaluation(scores, np.array(kept.failed))
 
 
 def _write(cache: Path | None, task: Task, outcome: Evaluation | Refusal) -> None:

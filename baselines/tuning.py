@@ -11,14 +11,18 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 
 import numpy as np
 import optuna
 from optuna import Study
 from optuna.distributions import BaseDistribution, FloatDistribution
+from optuna.exceptions import StorageInternalError
 from optuna.trial import TrialState
+from sqlalchemy import make_url
+from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
 from baselines.contender import registered
 from baselines.gains import Budget, GainsFile
@@ -28,6 +32,7 @@ from baselines.space import Space
 from usm_gym import parallel
 from usm_gym.conditions import FIELD, Conditions
 from usm_gym.evaluation import Evaluation, joined
+from usm_gym.files import holding
 from usm_gym.robot import Robot
 from usm_gym.scenario import Mode, Scenario, sample
 from usm_gym.seeding import TUNING, VALIDATION, stream
@@ -43,6 +48,8 @@ FIRST_EPISODES = 16
 FAILED = 1e4
 # Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.
 STARTUP_TRIALS = 2 * ROUND
+# Attributes of a trial: its objective, or None if it was given up early; and why it has no score.
+FOUND, REFUSED = "found", "refused"
 
 
 @dataclass(frozen=True)
@@ -150,7 +157,8 @@ def tune(
     Args:
         problem: What is tuned, and on what.
         storage: URL of Optuna's storage, in which an interrupted tuning is found again; without it,
-            the trials are kept in memory.
+            the trials are kept in memory. A study in a file of SQLite belongs to one process at a
+            time; on a server, see to that yourself.
         workers: Number of processes; without effect on the result.
         progress: Called with the number of trials that are done, and the best objective, mm.
 
@@ -159,8 +167,61 @@ def tune(
 
     Raises:
         ValueError: If the storage cannot be used, or no trial has a score.
+        BlockingIOError: If another process is at the same study in a file of SQLite.
     """
-    study = _study(problem, storage)
+    with _usable(storage, StorageInternalError, SQLAlchemyError), _held(storage, problem.study):
+        study = _study(problem, storage)
+        _search(study, problem, workers, progress)
+        best, value = dict(study.best_params), study.best_value
+        reason = study.best_trial.user_attrs.get(REFUSED)
+        pruned = len(study.get_trials(deepcopy=False, states=[TrialState.PRUNED]))
+    if value >= FAILED:
+        raise ValueError(f"no trial of {problem.policy} has a score: {reason}")
+    checks = [problem.task(gains, VALIDATION) for gains in ({}, best)]
+    start, validation = (objective(each, problem.weight) for each in score_all(checks, workers))
+    return Result(best, value, start, validation, pruned)
+
+
+@contextmanager
+def _usable(storage: str | None, *faults: type[Exception]) -> Iterator[None]:
+    """Say in the database's own words what is wrong with it, such as that the disk is full."""
+    try:
+        yield
+    except faults as error:
+        cause: BaseException = error
+        while cause.__cause__ is not None:
+            cause = cause.__cause__
+        with suppress(ArgumentError):
+            storage = make_url(storage or "").render_as_string(hide_password=True)
+        raise ValueError(f"storage {storage} cannot be used: {in_one_line(cause)}") from error
+
+
+def _held(storage: str | None, study: str) -> AbstractContextManager[None]:
+    """Keep a study in a file of SQLite from other processes; those on a server nobody locks."""
+    url = None if storage is None else make_url(storage)
+    if url is None or url.get_backend_name() != "sqlite" or url.database in (None, "", ":memory:"):
+        return nullcontext()
+    return holding(f"{url.database}-{study}")
+
+
+def _study(problem: Problem, storage: str | None) -> Study:
+    """The study of a problem, without a round that is half done."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    with _usable(storage, Exception):  # of any database
+        study = optuna.create_study(
+            study_name=problem.study,
+            storage=storage,
+            load_if_exists=True,
+            pruner=optuna.pruners.MedianPruner(n_startup_trials=STARTUP_TRIALS),
+        )
+    _tell(study)
+    return study
+
+
+def _search(
+    study: Study, problem: Problem, workers: int, progress: Callable[[int, float], object]
+) -> None:
+    """Carry out the rounds that are left."""
     progress(_finished(study), study.best_value if _finished(study) else float("nan"))
     while (done := _finished(study)) < problem.budget.trials:
         study.sampler = optuna.samplers.TPESampler(
@@ -173,31 +234,6 @@ def tune(
             study.enqueue_trial(_start(problem))
         _round(study, problem, min(ROUND, problem.budget.trials - done), workers)
         progress(_finished(study), study.best_value)
-    best = dict(study.best_params)
-    if study.best_value >= FAILED:
-        reason = study.best_trial.user_attrs["refused"]
-        raise ValueError(f"no trial of {problem.policy} has a score: {reason}")
-    checks = [problem.task(gains, VALIDATION) for gains in ({}, best)]
-    start, validation = (objective(each, problem.weight) for each in score_all(checks, workers))
-    pruned = study.get_trials(deepcopy=False, states=[TrialState.PRUNED])
-    return Result(best, study.best_value, start, validation, len(pruned))
-
-
-def _study(problem: Problem, storage: str | None) -> Study:
-    """The study of a problem, rid of the trials during which it was interrupted."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    try:
-        study = optuna.create_study(
-            study_name=problem.study,
-            storage=storage,
-            load_if_exists=True,
-            pruner=optuna.pruners.MedianPruner(n_startup_trials=STARTUP_TRIALS),
-        )
-    except Exception as error:  # of any database
-        raise ValueError(f"storage {storage} cannot be used: {in_one_line(error)}") from error
-    for left in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):
-        study.tell(left.number, state=TrialState.FAIL)
-    return study
 
 
 def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
@@ -209,22 +245,37 @@ def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
     trials = [study.ask(space) for _ in range(size)]
     tasks = [problem.task(trial.params, TUNING) for trial in trials]
     begun = _scored(tasks, 0, FIRST_EPISODES, workers)
-    going = []
     for index, trial in enumerate(trials):
         trial.report(objective(begun[index], problem.weight), 0)
-        if trial.should_prune():
-            study.tell(trial, state=TrialState.PRUNED)
-        else:
-            going.append(index)
-    outcomes = begun
+    going = [index for index, trial in enumerate(trials) if not trial.should_prune()]
+    outcomes = {index: begun[index] for index in going}
     if problem.budget.episodes > FIRST_EPISODES:
         rest = _scored([tasks[index] for index in going], FIRST_EPISODES, None, workers)
         outcomes = {index: _joined(begun[index], rest[k]) for k, index in enumerate(going)}
-    for index in going:
-        outcome = outcomes[index]
+    for index, trial in enumerate(trials):
+        outcome = outcomes.get(index)
         if isinstance(outcome, Refusal):
-            trials[index].set_user_attr("refused", outcome.reason)
-        study.tell(trials[index], objective(outcome, problem.weight))
+            trial.set_user_attr(REFUSED, outcome.reason)
+        trial.set_user_attr(FOUND, outcome and objective(outcome, problem.weight))
+    _tell(study)
+
+
+def _tell(study: Study) -> None:
+    """End the trials of a round: all with what was found, or, if that is not complete, as failed.
+
+    What was found is kept with every trial before the first of them ends. So a round during which
+    a tuning was killed counts as a whole or not at all, and what follows is the same.
+    """
+    trials = study.get_trials(deepcopy=False, states=[TrialState.RUNNING])
+    complete = all(FOUND in trial.user_attrs for trial in trials)
+    # Those without come last, so that a round that is not complete stays so until it is gone.
+    for trial in sorted(trials, key=lambda trial: FOUND not in trial.user_attrs):
+        if not complete:
+            study.tell(trial.number, state=TrialState.FAIL)
+        elif trial.user_attrs[FOUND] is None:
+            study.tell(trial.number, state=TrialState.PRUNED)
+        else:
+            study.tell(trial.number, trial.user_attrs[FOUND])
 
 
 def _scored(

@@ -1,55 +1,33 @@
-"""The console script `usm`: Ctrl-C ends a command with status 130 and one line.
-
-Imports take a second or more, so only the standard library is imported before that holds.
-"""
-
-from __future__ import annotations
+"""The console script `usm`: Ctrl-C ends a command with status 130 and one line."""
 
 import os
 import signal
 import sys
-from typing import NoReturn
 
-INTERRUPTED = 130
-SAID = "usm: interrupted\n"
+from usm_cli import interrupts
 
 
 def main() -> None:
     """Run the command that the arguments name."""
-    listen()
+    interrupts.listen()
     open_closed_streams()
-    from agents.main import main as run
+    from agents.main import main as run  # which takes a second or more
 
-    listening = signal.getsignal(signal.SIGINT) is leave
+    listening = signal.getsignal(signal.SIGINT) is interrupts.leave
     try:
         try:
             if listening:
-                signal.signal(signal.SIGINT, signal.default_int_handler)
+                signal.signal(signal.SIGINT, interrupts.Raise())
             run()
         finally:
             if listening:
                 # A second Ctrl-C neither breaks the clean-up at exit nor changes the status.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
-        sys.stderr.write(SAID)
-        sys.exit(INTERRUPTED)
+        sys.stderr.write(interrupts.LINE)
+        sys.exit(interrupts.STATUS)
     finally:
         drop_unwritable_output()
-
-
-def listen() -> None:
-    """Let Ctrl-C end the process, unless it was started to ignore that, as by `nohup usm &`."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, leave)
-
-
-def leave(number: int, frame: object) -> NoReturn:
-    """End the process at once: there is nothing to lose yet.
-
-    An exception would not do, since extension modules that are being imported may swallow it.
-    """
-    os.write(2, SAID.encode())
-    os._exit(INTERRUPTED)
 
 
 def open_closed_streams() -> None:

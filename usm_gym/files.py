@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout, lock_descriptor
 
 from usm_gym.validation import clipped, require
 
@@ -83,22 +87,93 @@ def check_writable(path: str | Path) -> None:
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give a new file to write instead of `path`, whose place it takes at the end, in one move.
 
-    Readers, and an interruption, see the old or the new one. The new one has the same suffix.
+    Readers, an interruption and a power cut see the old or the new one. The new one has the same
+    suffix. Parts that killed writers of `path` have left are removed. A part that is still being
+    written never is: its writer has locked it, and the system unlocks it only when the writer ends.
     """
     target = Path(path)
-    handle, name = tempfile.mkstemp(
-        dir=target.parent, prefix=f"{target.stem}.part", suffix=target.suffix
-    )
-    os.close(handle)
+    _remove_dead_parts(target)
+    handle, part = _new_part(target)
     try:
-        yield Path(name)
-        with open(name, "rb") as written:
-            os.fsync(written.fileno())
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, target)
+        with naming(target):
+            yield part
+            os.chmod(part, 0o666 & ~_umask())
+            sync(part)
+            os.replace(part, target)
+            sync_folder(target.parent)
     except BaseException:
-        os.unlink(name)
+        part.unlink(missing_ok=True)
         raise
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Name a file in errors of the system that name none, such as that of a full disk."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None and error.errno is not None:
+            error.filename = str(path)
+        raise
+
+
+@contextmanager
+def holding(path: str | Path) -> Iterator[None]:
+    """Keep an output, a file or a folder, from all others that would hold it at the same time.
+
+    The system locks a file, `.lock` in the folder or `.NAME.lock` beside the file, and unlocks it
+    when the process ends, however it ends: what a killed one leaves keeps nobody out.
+
+    Raises:
+        BlockingIOError: If another process holds the output.
+        OSError: If nothing can be written there.
+    """
+    target = Path(path)
+    file = target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
+    lock = FileLock(file)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise BlockingIOError(f"{target} is in use by another command") from error
+    try:
+        yield
+    finally:
+        # Still locked: whoever has opened it meanwhile finds that it has no name any more.
+        file.unlink(missing_ok=True)
+        lock.release()
+
+
+def sync(file: Path) -> None:
+    """Wait until what a file holds would survive a power cut."""
+    with open(file, "rb") as written:
+        os.fsync(written.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder would survive a power cut, where the system can do that."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def move_folder(part: Path, target: Path) -> None:
+    """Give a finished folder its name, a new one, in one move that survives a power cut."""
+    for file in part.iterdir():
+        sync(file)
+    sync_folder(part)
+    os.rename(part, target)
+    sync_folder(target.parent)
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder with all that is in it, if it is there."""
+    with suppress(FileNotFoundError):
+        shutil.rmtree(folder)
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
@@ -121,3 +196,34 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def _new_part(target: Path) -> tuple[int, Path]:
+    """Make an empty part of a file, locked until the handle is closed."""
+    while True:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f"{target.stem}.part", suffix=target.suffix
+        )
+        if _locked(handle) and os.fstat(handle).st_nlink > 0:
+            return handle, Path(name)
+        os.close(handle)  # another writer took it for dead before it was locked
+
+
+def _locked(handle: int) -> bool:
+    # Windows would keep others from writing to it, and from renaming it, by our own handle.
+    try:
+        return os.name == "nt" or lock_descriptor(handle, blocking=False)
+    except OSError:  # the file system has no locks: nobody will take it for dead
+        return True
+
+
+def _remove_dead_parts(target: Path) -> None:
+    pattern = f"{glob.escape(target.stem)}.part????????{glob.escape(target.suffix)}"
+    for part in target.parent.glob(pattern):
+        with suppress(OSError):
+            handle = os.open(part, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
+            try:
+                if lock_descriptor(handle, blocking=False):
+                    part.unlink()  # while it is locked, so that nobody begins to write it
+            finally:
+                os.close(handle)

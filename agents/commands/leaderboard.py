@@ -21,7 +21,7 @@ from agents.selection import (
 )
 from agents.terminal import output_console
 from baselines.leaderboard import MAIN, cells, document, everyone, front, suites
-from usm_gym.files import check_writable, write_json, write_text
+from usm_gym.files import check_writable, holding, write_json, write_text
 from usm_gym.provenance import provenance
 from usm_gym.suites import NAMES
 from usm_gym.validation import require
@@ -67,25 +67,28 @@ def run(arguments: argparse.Namespace) -> None:
     if page is not None:
         check_writable(arguments.insert)
     folder = output_folder(arguments.output or f"results/{version('usm-gym')}")
+    from baselines.leaderboard_figures import draw_all
+
     named = arguments.policies is not None
     contenders = chosen_contenders(arguments.policies) if named else everyone()
     fronts = {} if named else front()
     chosen = cells(contenders, fronts, suites(), arguments.time_limit)
-    outcomes = scored([cell.task for cell in chosen], arguments, folder / "cache")
-    found = {
-        "kind": "leaderboard",
-        "version": version("usm-gym"),
-        **document(list(zip(chosen, outcomes, strict=True)), fronts),
-        "provenance": provenance({"suites": list(NAMES)}),
-    }
-    require(MAIN in found["suites"], "--policies", arguments.policies, "one that acts, at least")
-    write_json(folder / "leaderboard.json", found)
-    write_text(folder / "leaderboard.csv", csv_text(found))
-    write_text(folder / "leaderboard.md", markdown(found))
-    if page is not None:
-        write_text(arguments.insert, with_table(page, found))
-    from baselines.leaderboard_figures import draw_all
-
-    draw_all(found, folder)
+    with holding(folder):
+        outcomes = scored([cell.task for cell in chosen], arguments, folder / "cache")
+        found = {
+            "kind": "leaderboard",
+            "version": version("usm-gym"),
+            **document(list(zip(chosen, outcomes, strict=True)), fronts),
+            "provenance": provenance({"suites": list(NAMES)}),
+        }
+        require(
+            MAIN in found["suites"], "--policies", arguments.policies, "one that acts, at least"
+        )
+        write_json(folder / "leaderboard.json", found)
+        write_text(folder / "leaderboard.csv", csv_text(found))
+        write_text(folder / "leaderboard.md", markdown(found))
+        if page is not None:
+            write_text(arguments.insert, with_table(page, found))
+        draw_all(found, folder)
     output_console().print(Markdown(table(found["suites"][MAIN])))
     leave_if_refused({id: why for rows in found["refused"].values() for id, why in rows.items()})

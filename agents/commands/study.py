@@ -10,7 +10,7 @@ from rich.markdown import Markdown
 
 from agents.options import add_computing, check_installed, computing, output_folder
 from agents.terminal import output_console, progress_bar
-from usm_gym.files import write_json, write_text
+from usm_gym.files import holding, write_json, write_text
 from usm_gym.provenance import provenance
 from usm_gym.validation import require
 
@@ -19,7 +19,9 @@ Train the agents that are shipped, and others that lack one thing each, under se
 them and the classical policies on unseen scenarios, at home and elsewhere; and look at what the
 agents do to their bases. Writes study.json, study.md and figures (extra `render`) into a folder,
 and each training into a folder of its own in `runs` there. An interrupted study goes on where it
-stopped, also within a training. Takes hours on two cores. Needs the extra `agents`.
+stopped, also within a training: its checkpoint, which is code, is run if its plan is that of the
+study, so give --output a folder of your own. A folder that holds another training, or parts of one
+without its plan, is refused. Takes hours on two cores. Needs the extra `agents`.
 """
 EXAMPLES = """\
 examples:
@@ -66,23 +68,26 @@ def run(arguments: argparse.Namespace) -> None:
     names = list(plans.PLANS) if arguments.only is None else arguments.only.split(",")
     folder = output_folder(arguments.output)
     runs = trainings.runs(names, arguments.seeds, folder, arguments.steps)
-    with computing(arguments) as workers, progress_bar() as bar:
-        line = bar.add_task("trainings", total=len(runs))
-        trainings.train_all(runs, workers, lambda run: bar.advance(line))
-        tasks = scores.tasks(runs, plans.RIVALS, arguments.episodes)
-        line = bar.add_task("episodes", total=sum(len(task.scenarios) for task in tasks.values()))
-        cache = folder / "cache"
-        outcomes = scores.score(tasks, workers, cache, lambda count: bar.advance(line, count))
-        found = {
-            **scores.document(runs, outcomes, plans.RIVALS),
-            "episodes": arguments.episodes,
-            "dissected": dissected(runs),
-            "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
-        }
-    write_json(folder / "study.json", found)
-    if arguments.ship is not None:
-        trainings.ship(runs, Path(arguments.ship), found["provenance"])
-    text = page.markdown(found)
-    write_text(folder / "study.md", text)
-    figures.draw_all(found, folder)
+    with holding(folder):
+        with computing(arguments) as workers, progress_bar() as bar:
+            line = bar.add_task("trainings", total=len(runs))
+            trainings.train_all(runs, workers, lambda run: bar.advance(line))
+            tasks = scores.tasks(runs, plans.RIVALS, arguments.episodes)
+            line = bar.add_task(
+                "episodes", total=sum(len(task.scenarios) for task in tasks.values())
+            )
+            cache = folder / "cache"
+            outcomes = scores.score(tasks, workers, cache, lambda count: bar.advance(line, count))
+            found = {
+                **scores.document(runs, outcomes, plans.RIVALS),
+                "episodes": arguments.episodes,
+                "dissected": dissected(runs),
+                "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
+            }
+        write_json(folder / "study.json", found)
+        if arguments.ship is not None:
+            trainings.ship(runs, Path(arguments.ship), found["provenance"])
+        text = page.markdown(found)
+        write_text(folder / "study.md", text)
+        figures.draw_all(found, folder)
     output_console().print(Markdown(text))

@@ -13,8 +13,10 @@ from usm_gym.validation import require
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
 --policies takes, its learning curve on held-out scenarios of the training distribution, logs for
-TensorBoard, and the last checkpoint. Frozen suites are never seen. The same
-command with --resume goes on from the last checkpoint. Needs the extra `agents`.
+TensorBoard, and the last checkpoint. Frozen suites are never seen. `usm train --resume --output
+DIR` goes on from the last checkpoint, and ends as if it had never been interrupted. A checkpoint is
+code, and to resume is to run it: do so only where you trained yourself. Without --resume a folder
+that holds anything of a training is refused, and nothing in it is opened. Needs the extra `agents`.
 """
 EXAMPLES = """\
 examples:
@@ -51,7 +53,11 @@ def add_to(subparsers: Any) -> None:
     add("--omit", metavar="A,B", help="entries of the observation that the agent is not shown")
     add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
     add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
-    add("--resume", action="store_true", help="go on from the last checkpoint in that folder")
+    add(
+        "--resume",
+        action="store_true",
+        help="go on from the last checkpoint there, which is code that is run: only from your own",
+    )
     parser.set_defaults(run=run)
 
 
@@ -59,7 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Train, with a progress bar, and say what came of it."""
     folder = Path(arguments.output)
     check_installed("usm train", "agents", "sb3_contrib")
-    from agents.plan import PLAN, Plan, read_plan
+    from agents.plan import Plan, read_plan
     from agents.training import train
 
     names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
@@ -73,8 +79,6 @@ def run(arguments: argparse.Namespace) -> None:
         require(not given, "--resume", ", ".join(given), "--output alone; the rest is kept there")
         plan = read_plan(folder)
     else:
-        fresh = not (folder / PLAN).exists()
-        require(fresh, "--output", str(folder), "a folder without a training, or --resume")
         plan = Plan(**given)
     with progress_bar() as bar:
         line = bar.add_task("", total=plan.steps)
@@ -82,7 +86,7 @@ def run(arguments: argparse.Namespace) -> None:
         def show(steps: int, validation: str) -> None:
             bar.update(line, completed=steps, description=validation)
 
-        curve = train(plan, folder, show)
+        curve = train(plan, folder, show, arguments.resume)
     best = min(curve, key=lambda point: point["max_error_x"] + point["max_error_y"])
     console = output_console()
     for name, point in (("before", curve[0]), ("best", best), ("last", curve[-1])):

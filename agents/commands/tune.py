@@ -11,7 +11,7 @@ from agents.options import add_computing, check_installed, computing, count, par
 from agents.terminal import figures, output_console, progress_bar
 from baselines.gains import Budget
 from usm_gym.conditions import FIELD
-from usm_gym.files import check_writable, write_json
+from usm_gym.files import check_writable, holding, write_json
 from usm_gym.provenance import provenance
 from usm_gym.scenario import MODES
 
@@ -69,26 +69,26 @@ def run(arguments: argparse.Namespace) -> None:
         seed=count(arguments, "seed", 0, least=0),
     )
     storage = arguments.storage or f"sqlite:///{output.with_suffix('.db').absolute()}"
-    with computing(arguments) as workers, progress_bar() as bar:
+    with holding(output), computing(arguments) as workers, progress_bar() as bar:
         line = bar.add_task(problem.policy, total=problem.budget.trials)
 
         def show(trials: int, best: float) -> None:
             bar.update(line, completed=trials, description=f"best {best:.3f} mm")
 
         result = tune(problem, storage, workers, show)
-    document = {
-        "policy": problem.policy,
-        "gains": result.gains,
-        "objective": result.objective,
-        "validation": {"own_gains": result.start, "these": result.validation},
-        "budget": {**asdict(problem.budget), "pruned": result.pruned},
-        "weight": problem.weight,
-        "mode": problem.mode,
-        "conditions": asdict(problem.conditions),
-        "space": {name: asdict(each) for name, each in problem.space.items()},
-        "provenance": provenance({"seed": problem.seed}),
-    }
-    write_json(output, document)
+        document = {
+            "policy": problem.policy,
+            "gains": result.gains,
+            "objective": result.objective,
+            "validation": {"own_gains": result.start, "these": result.validation},
+            "budget": {**asdict(problem.budget), "pruned": result.pruned},
+            "weight": problem.weight,
+            "mode": problem.mode,
+            "conditions": asdict(problem.conditions),
+            "space": {name: asdict(each) for name, each in problem.space.items()},
+            "provenance": provenance({"seed": problem.seed}),
+        }
+        write_json(output, document)
     console = output_console()
     for name, gain in result.gains.items():
         console.print(f"{name} = {figures(gain)} {problem.space[name].unit}", markup=False)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from agents.artifact import read_agent, write_agent
+from agents.checkpoint import CURVE, Point, traces
 from agents.plan import Plan, read_plan
 from agents.study.plans import AGENTS, PLANS, SEEDS
-from agents.training import CURVE, train
+from agents.training import train
 from usm_gym import parallel
+from usm_gym.files import read_json
 from usm_gym.validation import require
 
 
@@ -31,24 +32,34 @@ class Run:
     folder: Path
 
     @property
+    def begun(self) -> bool:
+        """Whether the folder holds this training, or its beginning; no checkpoint is opened.
+
+        Raises:
+            ValueError: If it holds a training of another plan, or one without a plan.
+        """
+        if not traces(self.folder):
+            return False
+        name = self.folder.name
+        had, has = read_plan(self.folder).command(name), self.plan.command(name)
+        require(had == has, f"the training in {self.folder}", had, has)
+        return True
+
+    @property
     def done(self) -> bool:
         """Whether the training has come to its end.
 
         Raises:
-            ValueError: If the folder holds a training of another plan.
+            ValueError: If the folder holds another one; see `begun`.
         """
-        if not (self.folder / CURVE).exists():
+        if not (self.begun and (self.folder / CURVE).exists()):
             return False
-        plan = read_plan(self.folder)
-        name = self.folder.name
-        had, has = plan.command(name), self.plan.command(name)
-        require(had == has, f"the training in {self.folder}", had, has)
-        return bool(self.curve[-1]["steps"] >= plan.steps)
+        return bool(self.curve[-1]["steps"] >= self.plan.steps)
 
     @property
-    def curve(self) -> list[dict[str, Any]]:
+    def curve(self) -> list[Point]:
         """The learning curve, as far as it goes."""
-        curve: list[dict[str, Any]] = json.loads((self.folder / CURVE).read_text())
+        curve: list[Point] = read_json(self.folder / CURVE)
         return curve
 
 
@@ -76,7 +87,13 @@ def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = Non
 
 
 def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], object]) -> None:
-    """Train what is not trained yet; an interrupted training goes on where it was."""
+    """Train what is not trained yet; an interrupted training goes on where it was.
+
+    Only a training of the very plan goes on: its checkpoint is code, which is run.
+
+    Raises:
+        ValueError: If a folder holds another training; then none has begun.
+    """
     waiting = []
     for run in chosen:
         if run.done:
@@ -89,7 +106,7 @@ def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], objec
 
 def train_one(run: Run) -> None:
     """Carry out one training."""
-    train(run.plan, run.folder, lambda steps, line: None)
+    train(run.plan, run.folder, lambda steps, line: None, resume=run.begun)
 
 
 def ship(chosen: Sequence[Run], folder: Path, provenance: Mapping[str, Any]) -> None:

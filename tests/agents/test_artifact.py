@@ -1,5 +1,7 @@
 """Files of agents: read back to the bit, and refused when anything about them is wrong."""
 
+import contextlib
+import dataclasses
 import json
 import os
 import pickle
@@ -11,7 +13,14 @@ import numpy as np
 import pytest
 
 import usm_gym
-from agents.artifact import DESCRIPTION, WEIGHTS, agent_contender, make_agent, write_agent
+from agents.artifact import (
+    DESCRIPTION,
+    WEIGHTS,
+    agent_contender,
+    make_agent,
+    read_agent,
+    write_agent,
+)
 from agents.main import main
 from agents.network import Network
 from agents.residual import Residual, ResidualPolicy
@@ -164,6 +173,38 @@ def test_a_spoilt_agent_is_refused_in_one_line(folder, spoil, message):
     assert "\n" not in str(caught.value)
     assert "secret" not in str(caught.value)
     assert len(str(caught.value)) < 2 * SAID
+
+
+@pytest.mark.parametrize("moves", [0, 1, 2, 3])
+def test_an_agent_that_is_killed_while_it_is_replaced_is_the_old_one_or_the_new_one(
+    moves, folder, monkeypatch
+):
+    old, net = read_agent(folder)
+    description = {
+        field.name: getattr(old, field.name)
+        for field in dataclasses.fields(old)
+        if field.name not in ("activation", "output", "weights")
+    }
+    newer = dataclasses.replace(net, biases=tuple(each + 1 for each in net.biases))
+    left, replace = moves, os.replace
+
+    def killed(part, target):
+        nonlocal left
+        if left == 0:
+            raise KeyboardInterrupt
+        left -= 1
+        replace(part, target)
+
+    monkeypatch.setattr(os, "replace", killed)
+    with contextlib.suppress(KeyboardInterrupt):
+        write_agent(folder, {**description, "steps": 2}, newer)
+    monkeypatch.undo()
+    agent, found = read_agent(folder)
+    assert agent.steps == (2 if moves >= 2 else 1)
+    expected = newer if moves >= 2 else net
+    assert (found.biases[0] == expected.biases[0]).all()
+    write_agent(folder, {**description, "steps": 2}, newer)
+    assert sorted(file.name for file in folder.iterdir()) == [DESCRIPTION, WEIGHTS]
 
 
 def test_the_command_line_takes_a_folder(folder, capsys):

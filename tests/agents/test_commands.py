@@ -55,7 +55,7 @@ def test_policies_lists_every_policy():
     assert all(id in answer.stdout for id in baselines.ids())
 
 
-@pytest.mark.parametrize("command", [[USM], [USM, "evaluate"], [sys.executable, "-m", "agents"]])
+@pytest.mark.parametrize("command", [[USM], [USM, "evaluate"], [sys.executable, "-m", "usm_cli"]])
 def test_help_teaches(command):
     answer = subprocess.run([*command, "--help"], capture_output=True, text=True, check=False)
     assert answer.returncode == 0

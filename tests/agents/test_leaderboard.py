@@ -16,6 +16,7 @@ from agents.commands import leaderboard
 from agents.main import main
 from baselines import gains, registry
 from baselines import leaderboard as board
+from usm_gym.files import holding
 from usm_gym.suites import suite
 
 ROOT = Path(__file__).parents[2]
@@ -247,3 +248,27 @@ def test_bad_input_gets_one_line_and_status_2(
     assert left.value.code == 2
     assert errors.count("\n") == 1
     assert said in errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "output"),
+    [
+        (["tune", "sta", "--output", "sta.json"], "sta.json"),
+        (["leaderboard", "--policies", "zero", "--output", "out"], "out"),
+        (["study", "residual", "--output", "out"], "out"),
+    ],
+)
+def test_of_two_commands_on_one_output_the_second_gets_one_line(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], output: str
+) -> None:
+    if output == "out":
+        (folder / output).mkdir()
+    with holding(output), pytest.raises(SystemExit, match="2"):
+        main(arguments)
+    assert capsys.readouterr().err == f"usm: error: {output} is in use by another command\n"
+
+
+def test_the_help_says_that_a_cluster_runs_code(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["evaluate", "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "Ray runs the code of whoever reaches it" in text

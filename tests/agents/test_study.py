@@ -1,6 +1,8 @@
 """The study of agents: what it trains, that it goes on where it stopped, and what its rows say."""
 
 import json
+import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 from agents import training
 from agents.artifact import read_agent
 from agents.main import main
+from agents.plan import Plan, write_plan
 from agents.study import dissection, page, plans, scores, trainings
 from agents.study.dissection import lateness
 from agents.study.plans import PLANS, SEEDS, TRANSFER
@@ -82,6 +85,27 @@ def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     assert message.count("\n") == 1
     assert "--steps 1024" in message
     assert "--steps 2048" in message
+
+
+@pytest.mark.parametrize("plan", [None, Plan(steps=2048)], ids=["no plan", "another plan"])
+def test_a_study_opens_no_checkpoint_but_those_of_its_own_plans(plan, tmp_path, capsys):
+    folder = tmp_path / "runs" / "reference-0"
+    (folder / "checkpoint-0000000000").mkdir(parents=True)
+    (folder / "checkpoint-0000000000" / "state").write_bytes(pickle.dumps(Bomb()))
+    if plan is not None:
+        write_plan(plan, folder)
+    command = ["study", "residual", "--only", "scale-3,reference", "--steps", "1024"]
+    with pytest.raises(SystemExit, match="2"):
+        main([*command, "--output", str(tmp_path)])
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert "runs/reference-0" in message
+    assert not (tmp_path / "runs" / "scale-3-0").exists()  # refused before anything is trained
+
+
+class Bomb:
+    def __reduce__(self):
+        return sys.exit, ("a checkpoint was run",)
 
 
 def test_every_seed_has_its_own_training_and_early_seeds_come_first(tmp_path):

@@ -1,55 +1,29 @@
 """Training: goes on after an interruption to the bit, says when it diverges, leaves an agent."""
 
-import json
+import pickle
 import subprocess
 import sys
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from stable_baselines3 import PPO
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import usm_gym
 from agents import algorithms, training
 from agents.artifact import make_agent
+from agents.checkpoint import CURVE, MODEL, REPLAY, STATE, latest_checkpoint
+from agents.main import main
+from agents.plan import PLAN as PLAN_FILE
 from agents.plan import Plan
 from agents.sb3_vec_env import SB3VecEnv
 from agents.training import DivergedError, train
+from usm_gym.files import holding
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import Robot
 
-# Trains in children that are killed after random times, and at last in one that is not. Children
-# are forked, so that each does not import everything again.
-KILLER = """
-import os, random, signal, sys, time
-from pathlib import Path
-from agents import training
-from agents.plan import Plan
-
-training.ROBOTS = {"ppo": 16}
-training.VALIDATION_EPISODES = training.TEST_EPISODES = 2
-plan, folder = Plan(steps=4096, interval=1024), Path(sys.argv[1])
-chance, steps, kills = random.Random(0), 0, 0
-while True:
-    child = os.fork()
-    if child == 0:
-        training.train(plan, folder, lambda steps, line: None)
-        os._exit(0)
-    if kills < 10:
-        time.sleep(chance.uniform(0.0, 4.0))
-        os.kill(child, signal.SIGKILL)
-        kills += 1
-    _, status = os.waitpid(child, 0)
-    kept = training.latest_checkpoint(folder)
-    reached = int(kept.name.partition("-")[2]) if kept else 0
-    assert reached >= steps, (reached, steps)
-    steps = reached
-    if status == 0:
-        break
-print(kills, steps)
-"""
 PLAN = Plan(steps=4096, interval=1024)
 SILENT = lambda steps, line: None  # noqa: E731
 
@@ -65,43 +39,104 @@ def errors(curve):
     return [(point["steps"], point["max_error_x"], point["max_error_y"]) for point in curve]
 
 
-def test_a_training_that_is_killed_ten_times_ends_with_the_same_bits(tmp_path):
-    whole = train(PLAN, tmp_path / "whole", SILENT)
-    folder = tmp_path / "killed"
-    answer = subprocess.run(
-        [sys.executable, "-c", KILLER, str(folder)], capture_output=True, text=True, check=False
-    )
-    assert answer.returncode == 0, answer.stderr
-    assert errors(read_curve(folder)) == errors(whole)
-    models = [
-        PPO.load(training.latest_checkpoint(each) / "model.zip", device="cpu")
-        for each in (tmp_path / "whole", folder)
-    ]
-    for ours, theirs in zip(*(model.policy.parameters() for model in models), strict=True):
-        assert (ours == theirs).all()
-
-
-def test_a_recurrent_training_that_is_stopped_goes_on_with_its_memory(tmp_path):
-    plan = Plan(algorithm="recurrent-ppo", steps=1024, interval=256)
+@pytest.mark.parametrize("algorithm", ["ppo", "recurrent-ppo"])
+def test_a_training_that_is_stopped_goes_on_to_the_bit(algorithm, tmp_path):
+    robots = training.ROBOTS[algorithm]
+    plan = Plan(algorithm=algorithm, steps=256 * robots, interval=64 * robots)
     whole = train(plan, tmp_path / "whole", SILENT)
 
     def stop(steps, line):
-        if steps >= 512:
+        if steps >= plan.steps // 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         train(plan, tmp_path / "stopped", stop)
-    assert errors(train(plan, tmp_path / "stopped", SILENT)) == errors(whole)
+    assert errors(train(plan, tmp_path / "stopped", SILENT, resume=True)) == errors(whole)
+    models = [
+        algorithms.CLASSES[algorithm].load(latest_checkpoint(folder) / MODEL, device="cpu")
+        for folder in (tmp_path / "whole", tmp_path / "stopped")
+    ]
+    for ours, theirs in zip(*(model.policy.parameters() for model in models), strict=True):
+        assert (ours == theirs).all()
     scenarios = usm_gym.suite("operation")[:1]
     policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path / "stopped"))
     assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 
-def read_curve(folder):
-    try:
-        return json.loads((folder / training.CURVE).read_text())
-    except FileNotFoundError:
-        return []
+class Bomb:
+    """A checkpoint that leaves a file when it is loaded."""
+
+    def __init__(self, file):
+        self.file = file
+
+    def __reduce__(self):
+        return Path.touch, (self.file,)
+
+
+def armed(folder, name="checkpoint-0000000000"):
+    """Put a checkpoint that is code into a folder; the file that its code makes."""
+    (folder / name).mkdir(parents=True)
+    for file in (STATE, MODEL, REPLAY):
+        (folder / name / file).write_bytes(pickle.dumps(Bomb(folder / "was run")))
+    return folder / "was run"
+
+
+@pytest.mark.parametrize(
+    "trace",
+    [
+        "checkpoint-0000000000",
+        "checkpoint.part",
+        PLAN_FILE,
+        CURVE,
+        "agent.json",
+        "policy.safetensors",
+        "events.out.tfevents.1.host.2.0",
+    ],
+)
+def test_a_folder_with_anything_of_a_training_is_refused_unread(trace, tmp_path, capsys):
+    ran = armed(tmp_path, trace)
+    with pytest.raises(SystemExit, match="2"):
+        main(["train", "--steps", "16", "--output", str(tmp_path)])
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert trace in message
+    assert "--resume" in message
+    assert not ran.exists()
+    assert [file.name for file in tmp_path.iterdir()] == [trace]
+
+
+def test_a_checkpoint_without_a_plan_is_not_resumed(tmp_path, capsys):
+    ran = armed(tmp_path)
+    with pytest.raises(SystemExit, match="2"):
+        main(["train", "--resume", "--output", str(tmp_path)])
+    assert "holds no training" in capsys.readouterr().err
+    assert not ran.exists()
+
+
+def test_a_finished_training_that_is_resumed_leaves_the_same_files(tmp_path):
+    plan = Plan(steps=1024, interval=1024)
+    curve = train(plan, tmp_path, SILENT)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+    assert train(plan, tmp_path, SILENT, resume=True) == curve
+    assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize("file", [STATE, MODEL])
+def test_a_checkpoint_that_cannot_be_read_gets_one_line(file, tmp_path):
+    plan = Plan(steps=1024, interval=1024)
+    train(plan, tmp_path, SILENT)
+    damaged = latest_checkpoint(tmp_path) / file
+    for data in (damaged.read_bytes()[:1000], pickle.dumps({"curve": []})):
+        damaged.write_bytes(data)
+        with pytest.raises(ValueError, match="is damaged, or of another version") as caught:
+            train(plan, tmp_path, SILENT, resume=True)
+        assert "\n" not in str(caught.value)
+
+
+def test_two_trainings_in_one_folder_are_one_and_one_line(tmp_path, capsys):
+    with holding(tmp_path), pytest.raises(SystemExit, match="2"):
+        main(["train", "--output", str(tmp_path)])
+    assert capsys.readouterr().err == f"usm: error: {tmp_path} is in use by another command\n"
 
 
 def test_the_log_has_the_metric_on_held_out_scenarios(tmp_path):
@@ -117,7 +152,8 @@ def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeyp
     monkeypatch.setitem(settings, "learning_starts", 100)
     monkeypatch.setitem(settings, "buffer_size", 1000)
     train(Plan(algorithm=algorithm, steps=200, interval=100), tmp_path, SILENT)
-    curve = train(Plan(algorithm=algorithm, steps=300, interval=100), tmp_path, SILENT)
+    longer = Plan(algorithm=algorithm, steps=300, interval=100)
+    curve = train(longer, tmp_path, SILENT, resume=True)
     assert [point["steps"] for point in curve] == [0, 100, 200, 300]
     scenarios = usm_gym.suite("operation")[:1]
     policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path))
@@ -165,7 +201,7 @@ def test_a_diverging_training_is_stopped_with_a_clear_word(tmp_path, monkeypatch
         ({"algorithm": "luck"}, "algorithm is 'luck'"),
         ({"env": "CartPole-v1"}, "env is 'CartPole-v1'"),
         ({"steps": 0}, "steps"),
-        ({"seed": -1}, "seed is -1"),
+        ({"seed": -1}, "seed"),
         ({"base": "os:system"}, "base is 'os:system'"),
     ],
 )

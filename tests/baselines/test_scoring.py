@@ -154,6 +154,42 @@ def test_what_is_kept_is_not_computed_again(
     assert episodes == [3]
 
 
+DAMAGES: dict[str, Callable[[dict[str, Any]], str]] = {
+    "empty": lambda data: "",
+    "truncated": lambda data: json.dumps(data)[:-20],
+    "no fields": lambda data: "{}",
+    "no object": lambda data: "[]",
+    "no numbers": lambda data: json.dumps({**data, "per_episode": {"max_error_x": "1"}}),
+    "words": lambda data: json.dumps(data).replace("0.", '"0."', 1),
+    "a metric short": lambda data: json.dumps(
+        {**data, "per_episode": dict(list(data["per_episode"].items())[1:])}
+    ),
+    "an episode short": lambda data: json.dumps({**data, "failed": data["failed"][1:]}),
+    "of other episodes": lambda data: json.dumps(
+        {
+            **data,
+            "per_episode": {name: row[1:] for name, row in data["per_episode"].items()},
+            "failed": data["failed"][1:],
+        }
+    ),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=list(DAMAGES))
+def test_kept_scores_that_are_damaged_are_computed_again(
+    damage: Callable[[dict[str, Any]], str], tmp_path: Path
+) -> None:
+    (whole,) = score_all([task("zero")], cache=tmp_path)
+    (file,) = tmp_path.iterdir()
+    text = file.read_text()
+    file.write_text(damage(json.loads(text)))
+    with pytest.warns(UserWarning, match=file.name) as warned:
+        (again,) = score_all([task("zero")], cache=tmp_path)
+    assert len(warned) == 1
+    assert_same(again, whole)
+    assert file.read_text() == text
+
+
 def test_a_key_tells_all_that_scores_depend_on() -> None:
     one = task("sta")
     others = [

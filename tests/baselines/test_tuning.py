@@ -1,5 +1,7 @@
 """Gains are tuned on training scenarios only, the same however the work is done."""
 
+import contextlib
+import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,6 +14,7 @@ import pytest
 pytest.importorskip("optuna", reason="the extra `tune` is not installed")
 
 import optuna
+import sqlalchemy
 
 from baselines import registry, tuning
 from baselines.gains import Budget
@@ -159,3 +162,71 @@ def test_what_makes_no_sense_is_refused(changes: dict[str, Any], named: str) -> 
 def test_a_storage_that_cannot_be_used_gets_one_line() -> None:
     with pytest.raises(ValueError, match="storage nonsense"):
         tune(problem(), "nonsense")
+
+
+@pytest.mark.parametrize(
+    ("method", "number"),
+    [("ask", 3), ("set_user_attr", 0), ("set_user_attr", 5), *(("tell", n) for n in (0, 3, 7, 19))],
+)
+def test_a_round_that_was_killed_counts_as_a_whole_or_not_at_all(
+    method: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner: Any = optuna.Trial if method == "set_user_attr" else optuna.Study
+    original, count = getattr(owner, method), 0
+
+    def killed(*arguments: Any, **options: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count > number:
+            raise KeyboardInterrupt
+        return original(*arguments, **options)
+
+    storage = f"sqlite:///{tmp_path / 'trials.db'}"
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, method, killed)
+        with pytest.raises(KeyboardInterrupt):
+            tune(problem(), storage)
+    assert tune(problem(), storage) == tune(problem())
+
+
+def test_a_study_in_a_file_belongs_to_one_process_at_a_time(tmp_path: Path) -> None:
+    storage = f"sqlite:///{tmp_path / 'trials.db'}"
+    brief, refused = problem(budget=Budget(8, 1)), []
+
+    def meanwhile(trials: int, best: float) -> None:
+        if trials == 0:
+            with pytest.raises(BlockingIOError, match="in use by another command") as caught:
+                tune(brief, storage)
+            refused.append(caught.value)
+            tune(problem(budget=Budget(1, 1), seed=1), storage)  # another study in the same file
+
+    assert tune(brief, storage, progress=meanwhile) == tune(brief)
+    assert len(refused) == 1
+
+
+def test_a_disk_that_fills_up_gets_one_line(tmp_path: Path) -> None:
+    def fill(connection: Any, *_: Any) -> None:
+        connection.execute("PRAGMA max_page_count = 1")  # no more than there are
+
+    engine, storage = sqlalchemy.engine.Engine, f"sqlite:///{tmp_path / 'trials.db'}"
+    tune(problem(budget=Budget(1, 1)), storage)
+    sqlalchemy.event.listen(engine, "checkout", fill)
+    try:
+        with pytest.raises(ValueError, match=r"trials\.db cannot be used: database .* full$"):
+            tune(problem(budget=Budget(60, 1)), storage)
+    finally:
+        sqlalchemy.event.remove(engine, "checkout", fill)
+    assert tune(problem(budget=Budget(2, 1)), storage)
+
+
+def test_a_locked_database_gets_one_line(tmp_path: Path) -> None:
+    with contextlib.closing(sqlite3.connect(tmp_path / "trials.db")) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(ValueError, match=r"cannot be used: database is locked$"):
+            tune(problem(), f"sqlite:///{tmp_path / 'trials.db'}?timeout=0")
+
+
+def test_a_password_is_not_said() -> None:
+    with pytest.raises(ValueError, match="storage") as caught:
+        tune(problem(), "nonsense://me:secret@host/trials")
+    assert "secret" not in str(caught.value)

@@ -33,6 +33,19 @@ class Interrupting:
         os.killpg(0, signal.SIGINT)
         time.sleep(60)
 """
+SWALLOWING = """
+import os, signal, time
+
+try:
+    os.killpg(0, signal.SIGINT)
+    time.sleep(0)
+except BaseException:
+    pass
+
+class Waiting:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        time.sleep(200)
+"""
 COMMANDS = {
     "policies": [],
     "evaluate": ["--policies", "sta", "--episodes", "1"],
@@ -49,13 +62,12 @@ COMMANDS = {
 }
 # The first import after Ctrl-C is listened for, one of an extension module, and the last.
 STARTING = ("agents.main", "numpy._core._multiarray_umath", "agents.terminal")
+# What a command imports when it is known, and after which it has much to do.
 RUNNING = {
-    "evaluate": "scipy.stats",
     "tune": "optuna",
     "train": "torch",
-    "study": "agents.study",
+    "study": "agents.study.figures",
     "watch": "agents.film",
-    "report": "agents.report",
 }
 
 
@@ -91,9 +103,14 @@ def test_ctrl_c_while_a_command_imports_what_it_needs(command: str, tmp_path: Pa
     assert found == (130, "usm: interrupted\n")
 
 
-@pytest.mark.parametrize("package", ["usm_cli", "agents"])
-def test_ctrl_c_at_the_start_of_a_package(package: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", package, "policies"]
+def test_ctrl_c_is_not_lost_in_a_module_that_swallows_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(SWALLOWING)
+    found = interrupted(tmp_path, [USM, "evaluate", "--policies", "mine:Waiting"])
+    assert found == (130, "usm: interrupted\n")
+
+
+def test_ctrl_c_at_the_start_of_the_package(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "usm_cli", "policies"]
     assert interrupted(tmp_path, command, MOMENT="numpy") == (130, "usm: interrupted\n")
 
 

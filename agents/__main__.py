@@ -1,6 +1,0 @@
-"""`python -m agents` is the `usm` command."""
-
-from usm_cli.main import main
-
-if __name__ == "__main__":
-    main()
