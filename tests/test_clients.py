@@ -125,4 +125,5 @@ def test_the_line_of_a_client_works(client, tmp_path, monkeypatch):
     module, use = CLIENTS[client]
     pytest.importorskip(module, exc_type=ImportError)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     use(LINES[client])

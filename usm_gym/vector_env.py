@@ -67,6 +67,9 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
     default), "SameStep" with `final_obs` and `final_info`, and "Disabled".
     """
 
+    # Until Gymnasium 1.4, an environment is closed even if its constructor has failed.
+    _viewer: Viewer | None = None
+
     def __init__(
         self,
         num_envs: int,

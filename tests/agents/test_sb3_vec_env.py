@@ -1,5 +1,7 @@
 """The Stable-Baselines3 face of the native vector environment."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -96,6 +98,15 @@ def test_ppo_trains_on_it():
     model.learn(4096)
     scores = usm_gym.evaluate(model, usm_gym.suite("operation")[:2])
     assert np.isfinite(scores.per_episode["max_error_x"]).all()
+
+
+def test_a_model_with_its_environment_is_scored_by_several_workers():
+    model = PPO("MlpPolicy", "usm_gym:USM-Operation-v0", device="cpu", seed=0)
+    assert model.get_env().render_mode == "rgb_array"
+    short = [replace(each, duration=1.0, settle_time=0.5) for each in usm_gym.suite("operation")]
+    one, two = (usm_gym.evaluate(model, short[:2], workers=workers) for workers in (1, 2))
+    for name, values in one.per_episode.items():
+        np.testing.assert_allclose(two.per_episode[name], values, rtol=1e-3)
 
 
 def test_the_residual_task_has_this_face_too():

@@ -130,6 +130,11 @@ def test_bad_arguments_are_refused(arguments, message):
         gym.make_vec(ID, vectorization_mode="vector_entry_point", **arguments)
 
 
+def test_what_was_never_made_can_be_closed():
+    env = usm_gym.vector_env.USMVectorEnv
+    env.__new__(env).close()
+
+
 def test_bad_calls_are_refused():
     envs = native(2)
     with pytest.raises(gym.error.ResetNeeded):
