@@ -40,14 +40,16 @@ class Raise:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal."""
+        import threading  # as the packages have done by now
+
         now = time.monotonic()
         self._since = self._since or now
         if _passes(frame) or now - self._since > PATIENCE:
             self._since = None
+            # Threads that are stopped in the midst of their work may fail, joblib's for one.
+            threading.excepthook = lambda failure: None
             raise KeyboardInterrupt
-        from threading import Timer, get_ident
-
-        again = Timer(PAUSE, _interrupt, (get_ident(),))
+        again = threading.Timer(PAUSE, _interrupt, (threading.get_ident(),))
         again.daemon = True
         again.start()
 

@@ -46,6 +46,22 @@ class Waiting:
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         time.sleep(200)
 """
+THREADED = """
+import os, signal, threading, time
+
+def fail():
+    raise RuntimeError("stopped in the midst of it")
+
+class Threaded:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        try:
+            os.killpg(0, signal.SIGINT)
+            time.sleep(60)
+        finally:
+            thread = threading.Thread(target=fail)
+            thread.start()
+            thread.join()
+"""
 COMMANDS = {
     "policies": [],
     "evaluate": ["--policies", "sta", "--episodes", "1"],
@@ -106,6 +122,12 @@ def test_ctrl_c_while_a_command_imports_what_it_needs(command: str, tmp_path: Pa
 def test_ctrl_c_is_not_lost_in_a_module_that_swallows_it(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(SWALLOWING)
     found = interrupted(tmp_path, [USM, "evaluate", "--policies", "mine:Waiting"])
+    assert found == (130, "usm: interrupted\n")
+
+
+def test_threads_that_fail_because_of_ctrl_c_are_no_news(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(THREADED)
+    found = interrupted(tmp_path, [USM, "evaluate", "--policies", "mine:Threaded"])
     assert found == (130, "usm: interrupted\n")
 
 
