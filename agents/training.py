@@ -90,7 +90,7 @@ def train(plan: Plan, folder: Path, report: Report, resume: bool = False) -> lis
     folder.mkdir(parents=True, exist_ok=True)
     with holding(folder):
         found = [] if resume else traces(folder)
-        name = f"what is in {folder} already"
+        name = f"the content of {folder}"
         require(not found, name, ", ".join(found), "nothing of a training, or --resume")
         write_plan(plan, folder)
         return _train(plan, folder, report)
