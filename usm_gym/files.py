@@ -135,6 +135,7 @@ def holding(path: str | Path) -> Iterator[None]:
     """
     target = Path(path)
     file = target / ".lock" if target.is_dir() else target.with_name(f".{target.name}.lock")
+    file.parent.stat()  # FileLock would make the folder
     lock = FileLock(file)
     try:
         lock.acquire(timeout=0)

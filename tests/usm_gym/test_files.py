@@ -101,6 +101,12 @@ def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_holding_an_output_makes_no_folder(tmp_path):
+    with pytest.raises(FileNotFoundError, match="missing"), holding(tmp_path / "missing" / "out"):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
 HOLDER = """
 import sys
 from usm_gym.files import holding
