@@ -81,6 +81,7 @@ def cleanrl(line):
 
 
 def minari(line):
+    pytest.importorskip("jax")  # which it collects with, and does not itself require
     env = evaluated(line, "import gymnasium as gym; from minari import DataCollector")
     env.reset(seed=0)
     env.step(env.action_space.sample())
