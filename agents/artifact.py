@@ -17,7 +17,6 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, TypeAdapter
-from pydantic.dataclasses import dataclass
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
@@ -29,7 +28,7 @@ from baselines.registry import make, register
 from usm_gym.files import read_bytes, read_json, sync_folder, write_bytes, write_json
 from usm_gym.nominal import Nominal
 from usm_gym.scenario import Mode
-from usm_gym.validation import CONFIG, in_one_line, require
+from usm_gym.validation import in_one_line, require, validated
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
 NEW_WEIGHTS = "policy.new.safetensors"  # for the moment between writing them and moving them
@@ -38,7 +37,7 @@ LARGEST_WEIGHTS = 256 * 2**20  # bytes
 PRETRAINED = Path(__file__).with_name("pretrained")
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Agent:
     """What `agent.json` says.
 

@@ -33,7 +33,7 @@ SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
 HERE = Track(speed=0.0, amplitude=0.0)
 FIRST_STEP = """
 import gymnasium, usm_gym
-env = gymnasium.make("USM-Operation-v0")
+env = gymnasium.make("usm_gym:USM-Operation-v0")
 env.reset(seed=0)
 env.step(env.action_space.sample())
 """
@@ -131,7 +131,10 @@ def vector_task(name: str, size: int, steps: int, threads: int = 1) -> Task:
     Starts of episodes are timed by `start_task`: how many there are depends on the policy.
     """
     envs = gym.make_vec(
-        "USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point", threads=threads
+        "usm_gym:USM-Operation-v0",
+        num_envs=size,
+        vectorization_mode="vector_entry_point",
+        threads=threads,
     )
     options = {"scenario": resting(size, Conditions(current_limit=0.0), Robot())}
     return _loop(name, envs, steps, size, options)
@@ -139,14 +142,16 @@ def vector_task(name: str, size: int, steps: int, threads: int = 1) -> Task:
 
 def start_task(name: str, size: int) -> Task:
     """Starts of episodes in the vector environment: draw, noise, first observation; us."""
-    envs = gym.make_vec("USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point")
+    envs = gym.make_vec(
+        "usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point"
+    )
     envs.reset(seed=0)
     return Task(name, envs.reset, size, 1e6)
 
 
 def sync_task(name: str, size: int, steps: int) -> Task:
     """The same through Gymnasium's `SyncVectorEnv` of single environments."""
-    envs = gym.make_vec("USM-Operation-v0", num_envs=size, vectorization_mode="sync")
+    envs = gym.make_vec("usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="sync")
     return _loop(name, envs, steps, size)
 
 

@@ -28,7 +28,7 @@ from usm_gym.validation import in_one_line
 
 CURVE, STATE, MODEL, REPLAY = "curve.json", "state", "model.zip", "replay"
 PART = "checkpoint.part"
-# Of what a training leaves in its folder.
+# Patterns of the names of all that a training leaves in its folder.
 TRACES = (PLAN, "checkpoint*", CURVE, DESCRIPTION, "policy*.safetensors", "events.out.tfevents*")
 
 Point = dict[str, Any]

@@ -19,7 +19,7 @@ from usm_gym.validation import require
 
 # How long a cluster may take to accept a connection, s.
 CONNECTION_TIME = 10.0
-# Of anything that an option counts: more was meant otherwise.
+# The largest count that an option takes: more is a slip of the pen.
 MOST, MOST_WORKERS = 1_000_000_000, 1000
 
 

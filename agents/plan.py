@@ -11,14 +11,13 @@ from typing import Annotated, Any
 import gymnasium as gym
 import numpy as np
 from pydantic import Field, Strict, TypeAdapter
-from pydantic.dataclasses import dataclass
 
 from agents.algorithms import CLASSES
 from agents.residual import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.conditions import FIELD, Conditions
 from usm_gym.files import read_bytes, write_json
 from usm_gym.scenario import Mode, Scenario, sample
-from usm_gym.validation import CONFIG, Count, in_one_line, require
+from usm_gym.validation import Count, in_one_line, require, validated
 
 PLAN = "plan.json"
 # The scenarios on which an agent is scored in the end, as `usm evaluate` samples them.
@@ -32,7 +31,7 @@ Seed = Annotated[int, Strict(), Field(ge=0, le=2**32 - 1)]
 Steps = Annotated[Count, Field(le=10**12)]
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Plan:
     """What is trained, and how long.
 

@@ -26,7 +26,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Leave with status 2."""
-        self.exit(2, f"{self.prog}: error: {clipped(message, SAID)} (see {self.prog} --help)\n")
+        said = clipped(" ".join(clipped(word) for word in message.split(" ")), SAID)
+        self.exit(2, f"{self.prog}: error: {said} (see {self.prog} --help)\n")
 
 
 def output_console() -> Console:

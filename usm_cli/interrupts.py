@@ -45,7 +45,8 @@ class Raise:
         now = time.monotonic()
         self._since = self._since or now
         if _passes(frame) or now - self._since > PATIENCE:
-            self._since = None
+            # Once is enough: another one would interrupt the clean-up.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
             # Threads that are stopped in the midst of their work may fail, joblib's for one.
             threading.excepthook = lambda failure: None
             raise KeyboardInterrupt

@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
-from pydantic.dataclasses import dataclass
 
 from usm_gym.robot import Hydrodynamics
-from usm_gym.validation import CONFIG, Number, Switch, build, require
+from usm_gym.validation import Number, Switch, build, require, validated
 
 # No water that a robot swims in moves faster, m/s.
 LARGEST_CURRENT = 5.0
@@ -22,7 +21,7 @@ Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
 FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Conditions:
     """Sensors, actuators, timing, and the ranges from which water and joint motion are drawn.
 

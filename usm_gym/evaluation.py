@@ -105,8 +105,8 @@ def evaluate(
             was trained on the residual task goes in as `agents.ResidualPolicy(env, model)`.
         scenarios: The episodes.
         robot: The robot; without one, the paper's.
-        workers: Number of processes; without effect on the result of a policy whose answer to a row
-            does not depend on the others, as that of torch does in the last bits.
+        workers: Number of processes; without effect on the result, unless the policy's answer to
+            a row depends on the other rows, as torch's does in its last bits.
         progress: Called now and then with the number of episodes done since the last call; with
             one worker, fractions of them.
 

@@ -108,7 +108,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
         raise
     finally:
-        os.close(handle)
+        if handle is not None:
+            os.close(handle)
 
 
 @contextmanager
@@ -144,8 +145,10 @@ def holding(path: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # Still locked: whoever has opened it meanwhile finds that it has no name any more.
-        file.unlink(missing_ok=True)
+        # Still locked: whoever has opened it meanwhile finds that it has no name any more. Windows
+        # keeps a file that is open.
+        with suppress(PermissionError):
+            file.unlink(missing_ok=True)
         lock.release()
 
 
@@ -202,31 +205,37 @@ def _umask() -> int:
     return mask
 
 
-def _new_part(target: Path) -> tuple[int, Path]:
-    """Make an empty part of a file, locked until the handle is closed."""
+def _new_part(target: Path) -> tuple[int | None, Path]:
+    """Make an empty part of a file, locked until the handle is closed.
+
+    On Windows, where an open file can be neither moved nor written by others, it has no lock.
+    """
     while True:
         handle, name = tempfile.mkstemp(
             dir=target.parent, prefix=f"{target.stem}.part", suffix=target.suffix
         )
+        if os.name == "nt":
+            os.close(handle)
+            return None, Path(name)
         if _locked(handle) and os.fstat(handle).st_nlink > 0:
             return handle, Path(name)
         os.close(handle)  # another writer took it for dead before it was locked
 
 
 def _locked(handle: int) -> bool:
-    # Windows would keep others from writing to it, and from renaming it, by our own handle.
     try:
-        return os.name == "nt" or lock_descriptor(handle, blocking=False)
+        return lock_descriptor(handle, blocking=False)
     except OSError:  # the file system has no locks: nobody will take it for dead
         return True
 
 
 def _remove_dead_parts(target: Path) -> None:
+    if os.name == "nt":
+        return  # nothing tells a dead part from one that is being written
     pattern = f"{glob.escape(target.stem)}.part????????{glob.escape(target.suffix)}"
     for part in target.parent.glob(pattern):
         with suppress(OSError):
-            flags = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
-            handle = os.open(part, os.O_RDWR | flags)
+            handle = os.open(part, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
             try:
                 if lock_descriptor(handle, blocking=False):
                     part.unlink()  # while it is locked, so that nobody begins to write it

@@ -9,9 +9,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, TypeAdapter
-from pydantic.dataclasses import dataclass
 
-from usm_gym.validation import CONFIG, Count, Number, build, require
+from usm_gym.validation import Count, Number, build, require, validated
 
 Direction = Literal["axial", "normal"]
 # Of the joint controllers; a scenario may bring its own.
@@ -21,7 +20,7 @@ Damping = Annotated[Number, Field(ge=0, le=1e6)]
 Hydrodynamics = Literal["consistent", "kelasidi2014"]
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Thruster:
     """A thruster at the centre of a link, pushing along the link or across it.
 
@@ -44,7 +43,7 @@ PAPER_THRUSTERS = (
 )
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Robot:
     """An underwater swimming manipulator: `links` equal links, joined end to end in a plane.
 

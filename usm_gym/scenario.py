@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import Field, Strict, TypeAdapter
-from pydantic.dataclasses import dataclass
 
 from usm_gym.conditions import (
     FIELD,
@@ -26,7 +25,7 @@ from usm_gym.conditions import (
 from usm_gym.plant.layout import MAX_SHIFTS
 from usm_gym.plant.motion import path_positions
 from usm_gym.robot import Damping, Stiffness
-from usm_gym.validation import CONFIG, Count, Number, Switch, build, require
+from usm_gym.validation import Count, Number, Switch, build, require, validated
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
@@ -41,7 +40,7 @@ Phase = Annotated[Number, Field(ge=-100, le=100)]
 NOISE, WATER = range(2)
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Path:
     """The path of the centre of mass, p_ref = (speed s, amplitude sin(frequency s)).
 
@@ -58,7 +57,7 @@ class Path:
     ramp: Time = 2.0
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Inspection:
     """The joint motion: the head side of the body bends one way, the other way, and back.
 
@@ -93,7 +92,7 @@ class Inspection:
 STILL = Inspection(bending_joints=1, times=(), deflections=())
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Water:
     """The water of one episode, which no controller is told.
 
@@ -115,7 +114,7 @@ class Water:
     ] = (1.0,) * 6
 
 
-@dataclass(frozen=True, config=CONFIG)
+@validated
 class Scenario:
     """One episode, complete.
 

@@ -24,6 +24,9 @@ from usm_gym.validation import require
 
 # Physics steps times links of the longest episode: ten minutes of computing or so.
 MOST_LINK_STEPS = 2_000_000_000
+# Links of all robots side by side, some gigabytes; and physics steps times links of one control
+# period, some seconds, which nothing can interrupt.
+MOST_LINKS, MOST_AT_ONCE = 4_000_000, 500_000_000
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,16 @@ class Simulation:
                 result.
         """
         require(threads >= 1, "threads", threads, "1 or more")
+        numbers = len(scenarios) * robot.links
+        work = numbers * scenarios[0].conditions.substeps
+        many = f"{len(scenarios)} robots of {robot.links} links"
+        require(numbers <= MOST_LINKS, "scenarios", many, f"up to {MOST_LINKS} links in all")
+        require(
+            work <= MOST_AT_ONCE,
+            "scenarios",
+            f"{many}, {scenarios[0].conditions.substeps} physics steps at a time",
+            f"up to {MOST_AT_ONCE} in all",
+        )
         self.robot = robot
         self.size = len(scenarios)
         self.layout = ObservationLayout(robot.links, len(robot.thrusters))

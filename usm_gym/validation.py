@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import reprlib
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
 T = TypeVar("T")
 
@@ -64,6 +66,27 @@ def real_array(name: str, value: object, allowed: str = "real numbers") -> NDArr
     return array
 
 
+@dataclass_transform(frozen_default=True)
+def validated(cls: type[T]) -> type[T]:
+    """Make a frozen dataclass whose fields are validated.
+
+    What is wrong with them is a `ValueError` of one line, where pydantic's own would have many.
+    """
+    made: Any = dataclass(frozen=True, config=CONFIG)(cls)
+    init = made.__init__
+
+    @functools.wraps(init)
+    def checked(self: Any, *arguments: Any, **fields: Any) -> None:
+        try:
+            init(self, *arguments, **fields)
+        except ValidationError as error:
+            raise ValueError(in_one_line(error)) from error
+
+    made.__init__ = checked
+    known: type[T] = made
+    return known
+
+
 def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dict of fields") -> T:
     """Make an object of a validated type from a dict of its fields.
 
@@ -76,10 +99,14 @@ def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dic
     Raises:
         ValueError: If it is no dict, a field is unknown, or a value not allowed.
     """
-    named = isinstance(fields, Mapping) and all(isinstance(field, str) for field in fields)
-    require(named, name, fields, allowed)
+    require(isinstance(fields, Mapping), name, fields, allowed)
     try:
-        return adapter.validate_python(dict(fields))
+        known = dict(fields)
+    except Exception as error:  # whatever a mapping of somebody's own does
+        raise ValueError(f"{name} is {brief(fields)}; allowed: {allowed}") from error
+    require(all(isinstance(field, str) for field in known), name, fields, allowed)
+    try:
+        return adapter.validate_python(known)
     except ValidationError as error:
         raise ValueError(in_one_line(error)) from error
 

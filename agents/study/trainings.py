@@ -11,7 +11,7 @@ from agents.artifact import read_agent, write_agent
 from agents.checkpoint import CURVE, Point, traces
 from agents.plan import Plan, read_plan
 from agents.study.plans import AGENTS, PLANS, SEEDS
-from agents.training import train
+from agents.training import VALIDATED, train
 from usm_gym import parallel
 from usm_gym.files import read_json
 from usm_gym.validation import require
@@ -58,9 +58,24 @@ class Run:
 
     @property
     def curve(self) -> list[Point]:
-        """The learning curve, as far as it goes."""
-        curve: list[Point] = read_json(self.folder / CURVE)
-        return curve
+        """The learning curve, as far as it goes.
+
+        Raises:
+            ValueError: If the file holds none.
+        """
+        curve = read_json(self.folder / CURVE)
+        valid = isinstance(curve, list) and curve and all(map(is_point, curve))
+        require(valid, f"file {self.folder / CURVE}", curve, "a learning curve")
+        known: list[Point] = curve
+        return known
+
+
+def is_point(value: Any) -> bool:
+    """Whether a value is what a validation found."""
+    names = ("steps", "seconds", *VALIDATED, "failures")
+    return isinstance(value, dict) and all(
+        isinstance(value.get(name), (int, float)) for name in names
+    )
 
 
 def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = None) -> list[Run]:

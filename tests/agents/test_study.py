@@ -18,6 +18,7 @@ from agents.study.plans import PLANS, SEEDS, TRANSFER
 from agents.study.scores import best_so_far, steps_to
 from agents.study.trainings import runs
 from usm_gym.conditions import FIELD
+from usm_gym.files import write_json
 
 
 @pytest.fixture(autouse=True)
@@ -106,6 +107,15 @@ def test_a_study_opens_no_checkpoint_but_those_of_its_own_plans(plan, tmp_path, 
 class Bomb:
     def __reduce__(self):
         return sys.exit, ("a checkpoint was run",)
+
+
+@pytest.mark.parametrize("curve", [{}, [], 5, [{"steps": "x"}], [[]]])
+def test_a_damaged_learning_curve_is_said_to_be_one(tmp_path, curve):
+    (run,) = runs(["residual-ppo"], 1, tmp_path)
+    write_plan(run.plan, run.folder)
+    write_json(run.folder / "curve.json", curve)
+    with pytest.raises(ValueError, match="a learning curve"):
+        assert run.done
 
 
 def test_every_seed_has_its_own_training_and_early_seeds_come_first(tmp_path):

@@ -163,7 +163,8 @@ def test_a_cache_in_the_shared_temporary_folder_is_the_users_alone(temporary):
 
 @only_posix
 @pytest.mark.parametrize(
-    "trap", ["link", "writable", "not sticky", "link to a cache", "owner", "owner above"]
+    "trap",
+    ["link", "writable", "not sticky", "link to a cache", "writable cache", "owner", "owner above"],
 )
 def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_path, monkeypatch):
     base = temporary / f"usm-gym-{os.getuid()}"
@@ -182,6 +183,10 @@ def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_
         compiling.cache_folder.cache_clear()
         (base / name).rmdir()
         (base / name).symlink_to(elsewhere)
+    elif trap == "writable cache":
+        name = Path(compiling.cache_folder(PACKAGE)).name
+        compiling.cache_folder.cache_clear()
+        (base / name).chmod(0o777)
     else:
         lstat = Path.lstat
         owned = {"owner": base, "owner above": temporary}[trap]

@@ -16,7 +16,7 @@ from usm_gym.env import USMEnv
 from usm_gym.nominal import nominal_of
 from usm_gym.robot import robot_of
 from usm_gym.scenario import MODES
-from usm_gym.validation import QUOTED, SAID, in_one_line
+from usm_gym.validation import QUOTED, SAID
 from usm_gym.vector_env import USMVectorEnv
 
 # Physics steps times links that an example may take.
@@ -29,7 +29,7 @@ def refused(call, *arguments, **options):
     try:
         return False, call(*arguments, **options)
     except ValueError as error:
-        text = in_one_line(error)
+        text = str(error)
         assert "\n" not in text
         assert len(text) <= SAID + 2 * QUOTED
         return True, None

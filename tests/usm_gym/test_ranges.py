@@ -9,20 +9,25 @@ from pydantic import TypeAdapter
 
 from agents.artifact import Agent
 from agents.plan import Plan
+from baselines.gains import Budget, GainsFile
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
 
-CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Scenario, Plan]
+CLASSES = [
+    *(Robot, Thruster, Conditions, Path, Inspection, Water, Scenario),
+    *(Plan, Agent, GainsFile, Budget),
+]
 NUMBER = r"(?<![\w.^])-?\d+(?:\.\d+)?(?:e-?\d+)?"
 LIMITS = {"minimum", "exclusiveMinimum"}, {"maximum", "exclusiveMaximum"}
 
 
 def numbers(schema: dict[str, typing.Any]) -> list[dict[str, typing.Any]]:
     """All schemas of numbers inside the schema of a field, objects of their own left out."""
+    if not isinstance(schema, dict):
+        return []
     if schema.get("type") in ("number", "integer"):
         return [schema]
     inner = [*schema.get("anyOf", []), *schema.get("prefixItems", [])]
-    if isinstance(schema.get("items"), dict):
-        inner.append(schema["items"])
+    inner += [schema[key] for key in ("items", "additionalProperties") if schema.get(key)]
     return [each for part in inner for each in numbers(part)]
 
 
@@ -31,7 +36,7 @@ def fields(cls: type) -> list[tuple[str, dict[str, typing.Any]]]:
     return [(name, each) for name, schema in properties.items() for each in numbers(schema)]
 
 
-@pytest.mark.parametrize("cls", [*CLASSES, Agent], ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
 def test_every_number_has_a_range(cls):
     for name, schema in fields(cls):
         for limits in LIMITS:

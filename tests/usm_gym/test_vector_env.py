@@ -135,6 +135,15 @@ def test_what_was_never_made_can_be_closed():
     env.__new__(env).close()
 
 
+def test_more_robots_than_one_process_can_bear_are_refused():
+    envs = native(16_000, robot={"links": 256})
+    with pytest.raises(ValueError, match="up to 4000000 links"):
+        envs.reset(seed=0, options={"scenario": "nominal"})
+    envs = native(4_000, conditions={"control_period": 0.2, "physics_step": 2e-5})
+    with pytest.raises(ValueError, match="physics steps at a time"):
+        envs.reset(seed=0, options={"scenario": "nominal"})
+
+
 def test_bad_calls_are_refused():
     envs = native(2)
     with pytest.raises(gym.error.ResetNeeded):

@@ -164,9 +164,12 @@ def _bases() -> Iterator[Path]:
 
 
 def _owned(folder: Path) -> bool:
-    """Whether it is a folder, not a link to one, and the user's."""
+    """Whether it is a folder, not a link to one, in which the user alone can write."""
     found = folder.lstat()
-    return stat.S_ISDIR(found.st_mode) and _user() in (None, found.st_uid)
+    if _user() is None:
+        return stat.S_ISDIR(found.st_mode)
+    shared = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not shared
 
 
 def _guarded(folder: Path) -> bool:
