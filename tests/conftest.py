@@ -1,4 +1,5 @@
 import os
+from datetime import timedelta
 from importlib import import_module, util
 
 import pytest
@@ -6,9 +7,10 @@ from hypothesis import settings
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of the tests appear on no screen
 
-# How many examples of hostile input are tried: few in every run, HYPOTHESIS_PROFILE=long for many.
+# How many examples of hostile input are tried: few in every run; HYPOTHESIS_PROFILE=long for many,
+# each of which has ten seconds.
 settings.register_profile("short", max_examples=25, deadline=None, derandomize=True)
-settings.register_profile("long", max_examples=2000, deadline=None)
+settings.register_profile("long", max_examples=2000, deadline=timedelta(seconds=10))
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "short"))
 
 
