@@ -29,8 +29,8 @@ from usm_gym.validation import Count, Number, Switch, build, require, validated
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
-# The longest episode; at the paper's step of 1e-5 s these are 200 s.
-MOST_PHYSICS_STEPS = 20_000_000
+# The longest episode: 1000 s at the paper's step of 1e-5 s.
+MOST_PHYSICS_STEPS = 100_000_000
 
 Time = Annotated[Number, Field(ge=0, le=3600)]
 Velocity = Annotated[Number, Field(ge=-LARGEST_CURRENT, le=LARGEST_CURRENT)]
@@ -125,7 +125,7 @@ class Scenario:
         conditions: Sensors, actuators, timing.
         water: The water of this episode.
         duration: Length of the episode, 1e-6 to 3600 s; a multiple of the control period, and
-            20 million physics steps at most.
+            100 million physics steps at most.
         settle_time: From when on errors count, 0 to 3600 s.
         noise_seed: Seed of the sensor noise, 0 to 2^64 - 1.
         joint_stiffness: Joint controllers' proportional gain, 0 to 1e6 N m/rad; None: the robot's.
