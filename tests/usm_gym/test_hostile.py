@@ -21,7 +21,20 @@ from usm_gym.vector_env import USMVectorEnv
 
 # Physics steps times links that an example may take.
 AFFORDABLE = 300_000
+ROBOT = Robot()
+NOMINAL = nominal_of(ROBOT, Scenario())
 CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Scenario]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """Compile the kernels, which takes longer than an example may."""
+    for world in (USMEnv("operation"), USMVectorEnv(3, "operation")):
+        world.reset(seed=0)
+        world.step(np.zeros(world.action_space.shape))
+    usm_gym.linearise(NOMINAL)
+    links = np.zeros(16)
+    usm_gym.accelerations(ROBOT, links, links, links[:2], links[:15], links[:5])
 
 
 def refused(call, *arguments, **options):
@@ -201,8 +214,6 @@ def test_environments_refuse_or_are_made(arguments):
     assert no or env.mode in MODES
 
 
-ROBOT = Robot()
-NOMINAL = nominal_of(ROBOT, Scenario())
 ARRAYS = st.one_of(ANYTHING, st.sampled_from([np.zeros(n) for n in (2, 5, 15, 16)]))
 
 
