@@ -22,7 +22,7 @@ from usm_gym.robot import Robot
 from usm_gym.scenario import Scenario
 from usm_gym.validation import require
 
-# Physics steps times links of the longest episode: ten minutes of computing or so.
+# Physics steps times links of the longest episode; at a step of 1e-3 s, 16 links swim 35 hours.
 MOST_LINK_STEPS = 2_000_000_000
 # Links of all robots side by side, some gigabytes; and physics steps times links of one control
 # period, some seconds, which nothing can interrupt.
