@@ -8,8 +8,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.compile import compiled, piece
-from usm_gym.plant.elementary import exp_of_negative
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.elementary import exp_of_negative
 from usm_gym.validation import require
 
 Array = NDArray[np.float32]

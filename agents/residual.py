@@ -14,9 +14,9 @@ from agents.residual_observer import ResidualObserver
 from baselines.contender import contender
 from baselines.estimator import Estimator
 from baselines.policy import Policy
+from usm_gym.kernels.compile import compiled
 from usm_gym.nominal import Nominal
 from usm_gym.observation import ObservationLayout
-from usm_gym.plant.compile import compiled
 from usm_gym.plant.thrusters import allocate
 from usm_gym.validation import Count, Number, is_whole, require
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from agents.residual_observation import BASE_STATES, ResidualLayout
 from baselines.policy import Policy, ScriptedPolicy, Signals
 from baselines.prediction import ESTIMATES
+from usm_gym.kernels.compile import compiled, piece, shared
 from usm_gym.observation import ObservationLayout
-from usm_gym.plant.compile import compiled, piece, shared
 from usm_gym.plant.measure import (
     HEADING_ERROR,
     JOINT_ANGLES,

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from baselines.observer import observe, observer_gains
 from baselines.paper_rate import Record
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
-from usm_gym.plant.compile import compiled
-from usm_gym.plant.elementary import cube_root
+from usm_gym.kernels.compile import compiled
+from usm_gym.kernels.elementary import cube_root
 
 Array = NDArray[np.float64]
 

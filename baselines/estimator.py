@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from baselines import kalman
 from baselines.policy import Array, Signals, model_of, room_for_signals, sense
+from usm_gym.kernels.compile import compiled
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled
 
 # Spectral densities of the noise on the acceleration (m/s^2 / sqrt(Hz)) and of that which drives
 # the disturbance (m/s^3 / sqrt(Hz)): those that `lqg` starts from.

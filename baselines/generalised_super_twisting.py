@@ -26,8 +26,8 @@ from baselines.observer import HOMOGENEOUS, compensating_force, observe, observe
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
 from baselines.super_twisting import adapt
+from usm_gym.kernels.compile import compiled, piece
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
 
 _SHARED: Space = {
     "observer_gain": Range(1e-2, 100.0, "m/s^3"),

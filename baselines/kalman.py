@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
+from usm_gym.kernels.compile import piece
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import piece
 from usm_gym.robot import Robot
 from usm_gym.validation import require
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.elementary import exp_of_negative
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
-from usm_gym.plant.elementary import exp_of_negative
 
 LADRC_SPACE: Space = {
     "observer_bandwidth": Range(2.0, 200.0, "rad/s"),

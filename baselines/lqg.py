@@ -21,8 +21,8 @@ from baselines.kalman import COMMAND, DISTURBANCE, ERROR, RATE, STATES, THRUST
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.prediction import ESTIMATES, Predictor, held_force
 from baselines.space import Range, Space
+from usm_gym.kernels.compile import compiled, piece
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
 
 LQG_SPACE: Space = {
     "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),

@@ -23,8 +23,8 @@ from baselines.kalman import COMMAND, ERROR, RATE, THRUST
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.prediction import Predictor, held_force
 from baselines.space import Range, Space
+from usm_gym.kernels.compile import compiled
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled
 
 MPC_SPACE: Space = {
     "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),

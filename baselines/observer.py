@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from usm_gym.plant.compile import piece
-from usm_gym.plant.elementary import cube_root
+from usm_gym.kernels.compile import piece
+from usm_gym.kernels.elementary import cube_root
 from usm_gym.validation import require
 
 # Exponent of L in k2: that printed in the paper, and the one that homogeneity asks for.

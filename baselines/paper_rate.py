@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from baselines.observer import observe, observer_gains
 from baselines.pd import PDGains, pd_force
 from baselines.super_twisting import SuperTwistingGains, super_twisting_force
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.metrics import LOST_ERROR
 from usm_gym.plant.chain import kinematics
-from usm_gym.plant.compile import compiled, piece
-from usm_gym.plant.lanes import WIDTH, block_at, spread
 from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
 from usm_gym.plant.step import move_water, physics_step

@@ -9,8 +9,8 @@ import numpy as np
 from baselines.observer import check_exponent, compensating_force, observe, observer_gains
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
+from usm_gym.kernels.compile import compiled, piece
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
 from usm_gym.validation import require
 
 Reading = Literal["force", "mass", "observer"]

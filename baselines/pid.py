@@ -13,8 +13,8 @@ import numpy as np
 
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
+from usm_gym.kernels.compile import compiled, piece
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
 
 PID_SPACE: Space = {
     "k_p": Range(30.0, 30000.0, "N/m"),

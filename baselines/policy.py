@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from baselines.space import Range
+from usm_gym.kernels.compile import compiled
+from usm_gym.kernels.elementary import sincos
 from usm_gym.nominal import Nominal
 from usm_gym.observation import ObservationLayout
-from usm_gym.plant.compile import compiled
-from usm_gym.plant.elementary import sincos
 from usm_gym.plant.measure import (
     HEADING_ERROR,
     JOINT_ANGLES,

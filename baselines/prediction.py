@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.policy import Array, Model, Signals
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
-from usm_gym.plant.lanes import WIDTH, block_at, spread
 from usm_gym.plant.layout import *
 from usm_gym.plant.measure import (
     JOINT_ANGLES,

@@ -17,8 +17,8 @@ import numpy as np
 from baselines.observer import HOMOGENEOUS, observe, observer_gains
 from baselines.policy import HEADING_RANGE, Array, ScriptedPolicy, Signals
 from baselines.space import Range, Space
+from usm_gym.kernels.compile import compiled, piece
 from usm_gym.nominal import Nominal
-from usm_gym.plant.compile import compiled, piece
 
 SLIDING_MODE_SPACE: Space = {
     "observer_gain": Range(1e-2, 1000.0, "m/s^3"),

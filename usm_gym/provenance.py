@@ -38,7 +38,8 @@ def _version(package: str) -> str | None:
 
 def _commit() -> str | None:
     """Commit of the checkout that the package runs from; None where it runs from elsewhere."""
-    root = Path(__file__).resolve().parents[1]
+    package = sys.modules[__name__.partition(".")[0]]
+    root = Path(str(package.__file__)).resolve().parents[1]
     if not (root / ".git").exists():
         return None
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.compile import compiled
+from usm_gym.kernels.compile import compiled
 
 # At this error an axis costs half of what it can cost at all, m.
 HALF_COST_ERROR = 0.02

@@ -11,10 +11,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.kernels.lanes import WIDTH
 from usm_gym.metrics import LOST_ERROR, TIME_TOLERANCE
 from usm_gym.observation import ObservationLayout
 from usm_gym.plant import layout as rows
-from usm_gym.plant.lanes import WIDTH
 from usm_gym.plant.measure import Table
 from usm_gym.plant.motion import filter_coefficients, lag_share
 from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles, run_threads

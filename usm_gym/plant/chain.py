@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from usm_gym.plant.compile import compiled, piece
-from usm_gym.plant.elementary import sincos
-from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.elementary import sincos
+from usm_gym.kernels.lanes import WIDTH, block_at, load, spread, store
 from usm_gym.plant.layout import *
 
 

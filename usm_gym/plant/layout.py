@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.compile import shared
-from usm_gym.plant.lanes import WIDTH
+from usm_gym.kernels.compile import shared
+from usm_gym.kernels.lanes import WIDTH
 
 # Physics steps since the start, as a float. Position, velocity, acceleration of the centre of mass.
 CLOCK, P_X, P_Y, V_X, V_Y, A_X, A_Y = range(7)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.plant.compile import piece
+from usm_gym.kernels.compile import piece
 from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from usm_gym.plant.compile import compiled, piece
-from usm_gym.plant.elementary import arctan, exp_of_negative, sincos
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.elementary import arctan, exp_of_negative, sincos
 
 
 @piece

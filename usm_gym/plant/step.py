@@ -12,10 +12,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.kernels.compile import compiled, parallel, piece
+from usm_gym.kernels.elementary import sincos
+from usm_gym.kernels.lanes import WIDTH, block_at, load, spread, store, where
 from usm_gym.plant.chain import accelerate, kinematics
-from usm_gym.plant.compile import compiled, parallel, piece
-from usm_gym.plant.elementary import sincos
-from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store, where
 from usm_gym.plant.layout import *
 from usm_gym.plant.measure import command, measure
 

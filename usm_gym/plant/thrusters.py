@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from usm_gym.plant.compile import piece
+from usm_gym.kernels.compile import piece
 
 
 @piece

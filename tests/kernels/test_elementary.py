@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from usm_gym.plant import elementary
-from usm_gym.plant.elementary import arctan, cube_root, exp_of_negative, sincos
-from usm_gym.plant.lanes import WIDTH, block_at, load, spread, store
+from usm_gym.kernels import elementary
+from usm_gym.kernels.elementary import arctan, cube_root, exp_of_negative, sincos
+from usm_gym.kernels.lanes import WIDTH, block_at, load, spread, store
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,8 @@
-"""How kernels are compiled, and where their machine code is kept.
+"""Where the machine code of kernels is kept.
+
+The folder of a kernel is named after the sources it was made from: the file of the kernel and those
+of all modules that it imports, directly or not. numba's own cache looks at the kernel's file alone
+and would serve stale code after an edit of a helper.
 
 numba's cache is made of pickles, so whoever can write in its folder can run code as the user.
 """
@@ -7,61 +11,40 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import stat
+import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache, lru_cache
+from functools import cache
+from importlib.util import resolve_name
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
-import numba.extending
 import platformdirs
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-# These three change no bit of a finite result. Contraction, reciprocals and reassociation would:
-# then scalar and vector code, and machines with and without FMA, would disagree.
-FLAGS = {"nnan", "ninf", "nsz"}
-
-PACKAGE = Path(__file__).resolve().parents[1]
-
-
-def compiled(function: F) -> F:
-    """Compile a kernel with numba, with flags that keep its bits the same on every machine.
-
-    The machine code is cached in a folder named after the sources it was made from, because
-    numba's own cache looks at the file of the outermost function alone and would serve stale
-    code after an edit of a helper.
-    """
-    return _kernel(function)
+# The imports at the top of a module: what is imported, or from where which names.
+IMPORT = re.compile(
+    r"^(?:import +([\w.]+)|from +([\w.]+) +import +(?:\(([^)]*)\)|([^#\n]+)))", re.MULTILINE
+)
+# Packages that have kernels or parts of them: an edit in one of them matters to what imports it.
+_packages: set[str] = set()
 
 
-def parallel(function: F) -> F:
-    """Compile a kernel as `compiled` does; its loops over `numba.prange` are shared by threads."""
-    return _kernel(function, parallel=True)
+def notice(function: Callable[..., Any]) -> None:
+    """Remember that the package of a function has parts of kernels."""
+    _packages.add(function.__module__.partition(".")[0])
 
 
-def piece(function: F) -> F:
-    """Compile a part of kernels, for use within `compiled` functions only."""
-    part: F = numba.njit(fastmath=FLAGS, error_model="numpy", forceinline=True)(function)
-    return part
-
-
-def shared(function: F) -> F:
-    """Let kernels call a plain Python function, which stays one for everybody else."""
-    kept: F = numba.extending.register_jitable(function)
-    return kept
-
-
-def _kernel(function: F, **options: Any) -> F:
-    source = Path(function.__code__.co_filename).resolve()
-    folder = cache_folder(source.parent) if source.exists() else None
-    options |= {"fastmath": FLAGS, "error_model": "numpy", "nogil": True}
-    kernel: Any = numba.njit(**options)(function)
+def keep(kernel: Any, function: Callable[..., Any]) -> None:
+    """Let a kernel look for its machine code in the folder of its sources, and leave it there."""
+    notice(function)
+    file = Path(function.__code__.co_filename).resolve()
+    folder = cache_folder(sources(file, function.__module__)) if file.exists() else None
     if folder is not None:
         # numba asks for the cache folder here; the user's own setting is put back.
         previous = numba.config.CACHE_DIR
@@ -70,8 +53,72 @@ def _kernel(function: F, **options: Any) -> F:
             kernel._cache = _Cache(function)
         finally:
             numba.config.CACHE_DIR = previous
-    kept: F = kernel
-    return kept
+
+
+def sources(file: Path, module: str) -> frozenset[Path]:
+    """The file of a module and those of all modules of ours that it imports, directly or not.
+
+    Ours are the modules of packages that have kernels, and those in the folder of the file.
+    """
+    found, waiting = {file}, [(file, module)]
+    while waiting:
+        for name, imported in imports(*waiting.pop()):
+            ours = name.partition(".")[0] in _packages or imported.parent == file.parent
+            if ours and imported not in found:
+                found.add(imported)
+                waiting.append((imported, name))
+    return frozenset(found)
+
+
+@cache
+def imports(file: Path, module: str) -> tuple[tuple[str, Path], ...]:
+    """Names and files of the modules that the top of a module imports.
+
+    Of `from package import name`, this is the module `package.name` if there is one, else `package`
+    itself: importing a module of a package does not depend on all that the package imports.
+    """
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    names: set[str] = set()
+    for whole, origin, inside, line in IMPORT.findall(file.read_text(encoding="utf-8")):
+        if origin:
+            origin = resolve_name(origin, package or None)
+        listed = [word.split(" as ")[0].strip() for word in (inside or line).split(",")]
+        parts = {f"{origin}.{word}" for word in listed if word}
+        names |= {name if name in sys.modules else origin for name in parts} | {whole}
+    files = ((name, getattr(sys.modules.get(name), "__file__", None)) for name in sorted(names))
+    return tuple((name, Path(known).resolve()) for name, known in files if known is not None)
+
+
+@cache
+def digest(file: Path) -> str:
+    """A hash of a file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@cache
+def cache_folder(files: frozenset[Path]) -> str | None:
+    """Find a writable folder for machine code that is made from some files.
+
+    `NUMBA_CACHE_DIR` is used where it is set, then the user's cache folder, then a folder of the
+    user's in the temporary directory.
+
+    Returns:
+        The folder, or None after a warning if there is none: kernels then compile anew in each
+        process.
+    """
+    fingerprint = hashlib.sha256(" ".join(sorted(map(digest, files))).encode()).hexdigest()
+    for base in _bases():
+        folder = base / fingerprint[:16]
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if not _owned(folder):
+                continue
+            with tempfile.TemporaryFile(dir=folder):
+                return str(folder)
+        except OSError:
+            continue
+    _warn_of_no_cache()
+    return None
 
 
 class _CacheFile(IndexDataCacheFile):
@@ -113,34 +160,6 @@ def _discard(path: str, error: Exception) -> None:
     )
     with suppress(OSError):
         os.unlink(path)
-
-
-@lru_cache
-def cache_folder(package: Path) -> str | None:
-    """Find a writable folder for machine code made from `usm_gym` and one more package folder.
-
-    `NUMBA_CACHE_DIR` is used where it is set, then the user's cache folder, then a folder of the
-    user's in the temporary directory.
-
-    Returns:
-        The folder, or None after a warning if there is none: kernels then compile anew in each
-        process.
-    """
-    fingerprint = hashlib.sha256()
-    for source in sorted({*PACKAGE.rglob("*.py"), *package.glob("*.py")}):
-        fingerprint.update(source.read_bytes())
-    for base in _bases():
-        folder = base / fingerprint.hexdigest()[:16]
-        try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not _owned(folder):
-                continue
-            with tempfile.TemporaryFile(dir=folder):
-                return str(folder)
-        except OSError:
-            continue
-    _warn_of_no_cache()
-    return None
 
 
 def _bases() -> Iterator[Path]:

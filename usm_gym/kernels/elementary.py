@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from usm_gym.plant.compile import piece
-from usm_gym.plant.lanes import where
+from usm_gym.kernels.compile import piece
+from usm_gym.kernels.lanes import where
 
 # Adding and subtracting 1.5 * 2^52 rounds to the nearest whole number.
 ROUND = 6755399441055744.0

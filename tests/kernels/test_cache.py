@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+import baselines
 import usm_gym
-from usm_gym.plant import compile as compiling
+from usm_gym.kernels import cache
+from usm_gym.kernels.compile import compiled
 
-PACKAGE = Path(usm_gym.__file__).parent
+PACKAGES = [Path(package.__file__).parent for package in (usm_gym, baselines)]
 POSITIONS = """
 import numpy as np
 import usm_gym
@@ -52,23 +54,90 @@ def run(code, **environment):
     return answer.stdout.splitlines()
 
 
-def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(tmp_path):
-    copy = tmp_path / "usm_gym"
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    environment = {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
+@pytest.fixture
+def copy(tmp_path):
+    """Copies of our packages that are imported in their place, and the environment for that."""
+    for package in PACKAGES:
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(package, tmp_path / package.name, ignore=ignored)
+    return tmp_path, {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
+
+
+def edit(file, old, new):
+    source = file.read_text()
+    assert source.count(old) == 1
+    file.write_text(source.replace(old, new))
+
+
+def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(copy):
+    folder, environment = copy
     cold = run(POSITIONS, **environment)
     warm = run(POSITIONS, **environment)
-    assert cold[1] == warm[1] == str(copy / "__init__.py")
+    assert cold[1] == warm[1] == str(folder / "usm_gym" / "__init__.py")
     assert (cold[0], warm[0]) == ("1", "0")
     assert cold[2:] == warm[2:]
     # A helper in another file than the kernel that was cached.
-    helper = copy / "plant" / "elementary.py"
-    source = helper.read_text()
-    assert source.count("half = 0.5 * z") == 1
-    helper.write_text(source.replace("half = 0.5 * z", "half = 0.25 * z"))
+    edit(folder / "usm_gym" / "kernels" / "elementary.py", "half = 0.5 * z", "half = 0.25 * z")
     edited = run(POSITIONS, **environment)
     assert edited[0] == "1"
     assert edited[2:] != warm[2:]
+
+
+LAWS = """
+import numpy as np
+from baselines import observer
+from baselines.pd import PDGains, pd
+from baselines.pid import PIDGains, pid
+from baselines.policy import room_for_signals
+
+signals = room_for_signals(np.zeros((1, 1), np.float32), 3)
+for value, signal in enumerate(signals[:5]):
+    signal[...] = 0.1 * (value + 1)
+for law, arguments in ((pd, (PDGains(), 0)), (pid, (PIDGains(),))):
+    state, force = np.full((1, 2, 4), 0.01), np.empty((1, 2))
+    law(signals, 0.02, 10.0, *arguments, state, force)
+    print(sum(law.stats.cache_misses.values()), float(force[0, 0]).hex())
+"""
+
+
+def test_an_edit_recompiles_the_kernels_that_use_it_and_no_others(copy):
+    folder, environment = copy
+    (cold_pd, force_pd), (cold_pid, force_pid) = map(str.split, run(LAWS, **environment))
+    assert (cold_pd, cold_pid) == ("1", "1")
+    assert run(LAWS, **environment) == [f"0 {force_pd}", f"0 {force_pid}"]
+    edit(folder / "baselines" / "observer.py", "state[2] += h * k3 * xi", "state[2] += h * xi")
+    (misses, force), other = map(str.split, run(LAWS, **environment))
+    assert misses == "1"
+    assert force != force_pd
+    assert other == ["0", force_pid]
+
+
+OWN = """
+import my_laws.law
+force = my_laws.law.force(2.0)
+print(sum(my_laws.law.force.stats.cache_misses.values()), force)
+"""
+
+
+def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
+    sources = {
+        "my_laws/__init__.py": "",
+        "my_laws/parts/__init__.py": "",
+        "my_laws/parts/gains.py": "GAIN = 3.0\n",
+        "my_laws/parts/proportional.py": "from .gains import GAIN\n"
+        "from usm_gym.kernels.compile import piece\n\n\n"
+        "@piece\ndef proportional(x):\n    return GAIN * x\n",
+        "my_laws/law.py": "from usm_gym.kernels.compile import compiled\n"
+        "from .parts import proportional as part\n\nproportional = part.proportional\n\n\n"
+        "@compiled\ndef force(x):\n    return proportional(x)\n",
+    }
+    for name, source in sources.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(source)
+    environment = {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
+    assert [run(OWN, **environment)[0] for _ in range(2)] == ["1 6.0", "0 6.0"]
+    (tmp_path / "my_laws" / "parts" / "gains.py").write_text("GAIN = 4.0\n")
+    assert run(OWN, **environment) == ["1 8.0"]
 
 
 def test_a_processor_without_vector_or_fused_instructions_computes_the_same_bits(tmp_path):
@@ -79,7 +148,7 @@ def test_a_processor_without_vector_or_fused_instructions_computes_the_same_bits
 @pytest.fixture
 def fresh():
     """Let the cache folder be looked for anew, in this test and after it."""
-    caches = compiling.cache_folder, compiling._warn_of_no_cache
+    caches = cache.cache_folder, cache._warn_of_no_cache
     for each in caches:
         each.cache_clear()
     yield
@@ -90,18 +159,18 @@ def fresh():
 def test_without_a_writable_folder_kernels_work_after_a_warning(fresh, monkeypatch, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
-    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiling.platformdirs, "user_cache_path", lambda name: blocked / name)
-    monkeypatch.setattr(compiling.tempfile, "gettempdir", lambda: str(blocked))
+    monkeypatch.setattr(cache.numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(cache.platformdirs, "user_cache_path", lambda name: blocked / name)
+    monkeypatch.setattr(cache.tempfile, "gettempdir", lambda: str(blocked))
     with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR"):
-        double = compiling.compiled(lambda x: 2.0 * x)
+        double = compiled(lambda x: 2.0 * x)
     assert double(2.0) == 4.0
 
 
 def test_an_unwritable_home_falls_back_to_the_temporary_directory(tmp_path):
     nowhere = tmp_path / "file"
     nowhere.write_text("no folder")
-    code = "from usm_gym.plant.compile import cache_folder, PACKAGE; print(cache_folder(PACKAGE))"
+    code = "from usm_gym.kernels.cache import cache_folder; print(cache_folder(frozenset()))"
     environment = {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "TMPDIR": tmp_path}
     assert run(code, **environment, NUMBA_CACHE_DIR="")[0].startswith(str(tmp_path))
 
@@ -144,9 +213,9 @@ def temporary(fresh, monkeypatch, tmp_path):
     shared = tmp_path.resolve() / "tmp"
     shared.mkdir()
     shared.chmod(0o1777)
-    monkeypatch.setattr(compiling.numba.config, "CACHE_DIR", "")
-    monkeypatch.setattr(compiling.platformdirs, "user_cache_path", lambda name: Path("~") / name)
-    monkeypatch.setattr(compiling.tempfile, "gettempdir", lambda: str(shared))
+    monkeypatch.setattr(cache.numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(cache.platformdirs, "user_cache_path", lambda name: Path("~") / name)
+    monkeypatch.setattr(cache.tempfile, "gettempdir", lambda: str(shared))
     return shared
 
 
@@ -155,7 +224,7 @@ only_posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="owners and mo
 
 @only_posix
 def test_a_cache_in_the_shared_temporary_folder_is_the_users_alone(temporary):
-    folder = Path(compiling.cache_folder(PACKAGE))
+    folder = Path(cache.cache_folder(frozenset()))
     assert folder.parent == temporary / f"usm-gym-{os.getuid()}"
     for each in (folder, folder.parent):
         assert each.stat().st_mode & 0o777 == 0o700
@@ -179,13 +248,13 @@ def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_
     elif trap == "not sticky":
         temporary.chmod(0o777)
     elif trap == "link to a cache":
-        name = Path(compiling.cache_folder(PACKAGE)).name
-        compiling.cache_folder.cache_clear()
+        name = Path(cache.cache_folder(frozenset())).name
+        cache.cache_folder.cache_clear()
         (base / name).rmdir()
         (base / name).symlink_to(elsewhere)
     elif trap == "writable cache":
-        name = Path(compiling.cache_folder(PACKAGE)).name
-        compiling.cache_folder.cache_clear()
+        name = Path(cache.cache_folder(frozenset())).name
+        cache.cache_folder.cache_clear()
         (base / name).chmod(0o777)
     else:
         lstat = Path.lstat
@@ -198,7 +267,7 @@ def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_
 
         monkeypatch.setattr(Path, "lstat", other)
     with pytest.warns(UserWarning, match="no safe and writable cache folder") as caught:
-        folders = [compiling.cache_folder(package) for package in (PACKAGE, PACKAGE / "plant")]
+        folders = [cache.cache_folder.__wrapped__(frozenset()) for _ in range(2)]
     assert folders == [None, None]
     assert len(caught) == 1
     assert list(elsewhere.iterdir()) == []

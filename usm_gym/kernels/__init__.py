@@ -1,0 +1,1 @@
+"""Compiled functions: how they are made and cached, and numbers for several robots side by side."""
