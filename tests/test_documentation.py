@@ -7,11 +7,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import usm_baselines
 from markdown_it import MarkdownIt
+from usm_agents.artifact.folder import PRETRAINED
 
-import baselines
-from agents.artifact import PRETRAINED
-from agents.main import main
+from usm_cli.program import main
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -99,7 +99,9 @@ def test_every_block_of_a_page_runs(page, folder):
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
 def test_what_a_page_names_is_there(page):
     text = page.read_text(encoding="utf-8")
-    for name in re.findall(r"`((?:agents|baselines|docs|notebooks|tests|usm_gym)/[\w./-]*)`", text):
+    for name in re.findall(
+        r"`((?:agents|baselines|docs|notebooks|tests|usm_cli|usm_gym)/[\w./-]*)`", text
+    ):
         assert (ROOT / name).exists(), name
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
         "optional-dependencies"
@@ -111,7 +113,7 @@ def test_what_a_page_names_is_there(page):
 def test_every_law_has_its_place_among_the_controllers():
     text = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
     shown = {id for ids in re.findall(r"<!-- law: (.+?) -->", text) for id in ids.split(", ")}
-    laws = {id for id in baselines.ids() if not (PRETRAINED / id).exists()} - {"zero"}
+    laws = {id for id in usm_baselines.ids() if not (PRETRAINED / id).exists()} - {"zero"}
     assert {id.removesuffix("-tuned") for id in laws} == shown
 
 

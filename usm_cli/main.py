@@ -11,7 +11,7 @@ def main() -> None:
     """Run the command that the arguments name."""
     interrupts.listen()
     open_closed_streams()
-    from agents.main import main as run  # which takes a second or more
+    from usm_cli.program import main as run  # which takes a second or more
 
     listening = signal.getsignal(signal.SIGINT) is interrupts.leave
     try:

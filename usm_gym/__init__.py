@@ -2,15 +2,15 @@
 
 from importlib.metadata import version
 
-from usm_gym.conditions import Conditions
 from usm_gym.dynamics import accelerations
 from usm_gym.evaluation import Evaluation, evaluate
 from usm_gym.linear_model import LinearModel, linearise
-from usm_gym.metrics import max_error
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
-from usm_gym.scenario import Inspection, Path, Scenario, Water
 from usm_gym.suites import suite
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.metrics import max_error
+from usm_gym.task.scenario import Inspection, Path, Scenario, Water
 
 __all__ = [
     "Conditions",

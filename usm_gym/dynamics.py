@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.plant import layout
 from usm_gym.plant.chain import Body, accelerate_all
 from usm_gym.robot import Hydrodynamics, Robot
-from usm_gym.validation import brief, real_array, require
+from usm_gym.support.validation import brief, real_array, require
 
 Array = NDArray[np.float64]
 

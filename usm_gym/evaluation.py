@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym import metrics, parallel
-from usm_gym.env import saturated
-from usm_gym.observation import ObservationLayout
+from usm_gym.envs.env import saturated
 from usm_gym.robot import Robot
-from usm_gym.scenario import Scenario
 from usm_gym.simulation import Simulation
 from usm_gym.statistics import mean_interval
-from usm_gym.validation import is_whole, require
+from usm_gym.support import parallel
+from usm_gym.support.validation import is_whole, require
+from usm_gym.task import metrics
+from usm_gym.task.observation import ObservationLayout
+from usm_gym.task.scenario import Scenario
 
 AXES = ("x", "y")
 # What side by side is kept of all episodes: some three gigabytes.
@@ -102,7 +103,7 @@ def evaluate(
     Args:
         policy: Anything with `predict`; it is called with a batch axis. To be pickled for more than
             one worker. One with `privileged = True` is also given `snapshot=`, the true state. What
-            was trained on the residual task goes in as `agents.ResidualPolicy(env, model)`.
+            was trained on the residual task goes in as `usm_agents.ResidualPolicy(env, model)`.
         scenarios: The episodes.
         robot: The robot; without one, the paper's.
         workers: Number of processes; without effect on the result, unless the policy's answer to
@@ -275,7 +276,8 @@ def _require_fit(policy: Any, robot: Robot) -> None:
             space.shape == shape,
             "the shape of the policy's observation",
             space.shape,
-            f"{shape}; a model of the residual task goes in as agents.ResidualPolicy(env, model)",
+            f"{shape}; a model of the residual task goes in as "
+            "usm_agents.ResidualPolicy(env, model)",
         )
 
 

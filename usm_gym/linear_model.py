@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from usm_gym.conditions import FIELD, Conditions
-from usm_gym.nominal import Nominal
 from usm_gym.plant import layout as rows
-from usm_gym.scenario import STILL, Scenario
 from usm_gym.simulation import Simulation
-from usm_gym.validation import real_array, require
+from usm_gym.support.validation import real_array, require
+from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.nominal import Nominal
+from usm_gym.task.scenario import STILL, Scenario
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gymnasium as gym
 
-from usm_gym.scenario import MODES
+from usm_gym.task.scenario import MODES
 
 
 def register_environments() -> None:
@@ -12,7 +12,7 @@ def register_environments() -> None:
     for mode in MODES:
         gym.register(
             id=f"USM-{mode.capitalize()}-v0",
-            entry_point="usm_gym.env:USMEnv",
-            vector_entry_point="usm_gym.vector_env:USMVectorEnv",
+            entry_point="usm_gym.envs.env:USMEnv",
+            vector_entry_point="usm_gym.envs.vector_env:USMVectorEnv",
             kwargs={"mode": mode},
         )

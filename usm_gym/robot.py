@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, TypeAdapter
 
-from usm_gym.validation import Count, Number, build, require, validated
+from usm_gym.support.validation import Count, Number, build, require, validated
 
 Direction = Literal["axial", "normal"]
 # Of the joint controllers; a scenario may bring its own.

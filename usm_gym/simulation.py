@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.kernels.lanes import WIDTH
-from usm_gym.metrics import LOST_ERROR, TIME_TOLERANCE
-from usm_gym.observation import ObservationLayout
 from usm_gym.plant import layout as rows
 from usm_gym.plant.measure import Table
 from usm_gym.plant.motion import filter_coefficients, lag_share
 from usm_gym.plant.step import Fleet, Plant, observe_one, run_lanes, run_singles, run_threads
 from usm_gym.robot import Robot
-from usm_gym.scenario import Scenario
-from usm_gym.validation import require
+from usm_gym.support.validation import require
+from usm_gym.task.metrics import LOST_ERROR, TIME_TOLERANCE
+from usm_gym.task.observation import ObservationLayout
+from usm_gym.task.scenario import Scenario
 
 # Physics steps times links of the longest episode; at a step of 1e-3 s, 16 links swim 35 hours.
 MOST_LINK_STEPS = 2_000_000_000

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from usm_gym.validation import require
+from usm_gym.support.validation import require
 
 RESAMPLES = 10_000
 # Single episodes are chaotic: from fewer no conclusion is drawn.

@@ -5,11 +5,11 @@ from functools import cache
 
 import matplotlib
 import numpy as np
+from usm_baselines.contender import contender
 
 import usm_gym
-from baselines.contender import contender
 from usm_gym.evaluation import rollout
-from usm_gym.nominal import nominal_of
+from usm_gym.task.nominal import nominal_of
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import figures
 import griffe
+import usm_baselines
 from mkdocs.exceptions import PluginError
 
-import baselines
 import usm_gym
-from agents.terminal import figures as in_figures
-from agents.terminal import mm
-from usm_gym.nominal import nominal_of
+from usm_gym.support.text import figures as in_figures
+from usm_gym.support.text import mm
+from usm_gym.task.nominal import nominal_of
 
 LEADERBOARD = Path(__file__).parents[2] / "results" / usm_gym.__version__ / "leaderboard.json"
 SHOWN = {"operation": "field", "operation-ideal": "ideal", "operation-rough": "rough"}
@@ -44,7 +44,7 @@ def law(ids, everyone):
 
 def shipped(ids):
     """Policies, each followed by its tuned form if there is one."""
-    known = baselines.ids()
+    known = usm_baselines.ids()
     for id in ids:
         if id not in known:
             raise PluginError(f"law is {id}; allowed: {', '.join(known)}")
@@ -66,7 +66,7 @@ def gains(ids):
 
 def made(id):
     """The gains of a policy."""
-    return baselines.make(id, nominal_of(usm_gym.Robot(), figures.scenario())).gains
+    return usm_baselines.make(id, nominal_of(usm_gym.Robot(), figures.scenario())).gains
 
 
 def meanings(kind):

@@ -6,8 +6,8 @@ from pathlib import Path
 from mkdocs.structure.files import File
 
 import usm_gym
-from agents.commands.bench import MEANINGS
-from agents.terminal import figures
+from usm_cli.commands.bench import MEANINGS
+from usm_gym.support.text import figures
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "results" / usm_gym.__version__

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from interrupts import listening
+from support.interrupts import listening
 
 USM = Path(sys.executable).with_name("usm")
 # Interrupts the process group, as a terminal does, at the first import of a module: deterministic,
@@ -77,13 +77,13 @@ COMMANDS = {
     "bench": [],
 }
 # The first import after Ctrl-C is listened for, one of an extension module, and the last.
-STARTING = ("agents.main", "numpy._core._multiarray_umath", "agents.terminal")
+STARTING = ("usm_cli.program", "numpy._core._multiarray_umath", "usm_cli.terminal")
 # What a command imports when it is known, and after which it has much to do.
 RUNNING = {
     "tune": "optuna",
     "train": "torch",
-    "study": "agents.study.figures",
-    "watch": "agents.film",
+    "study": "usm_agents.study.figures",
+    "watch": "usm_cli.film",
 }
 
 
@@ -149,7 +149,7 @@ def test_ctrl_c_while_workers_work(tmp_path: Path) -> None:
 
 def test_a_command_that_was_started_to_ignore_ctrl_c_ignores_it(tmp_path: Path) -> None:
     command = ["sh", "-c", f"trap '' INT; {USM} policies"]
-    assert interrupted(tmp_path, command, MOMENT="agents.terminal") == (0, "")
+    assert interrupted(tmp_path, command, MOMENT="usm_cli.terminal") == (0, "")
 
 
 @pytest.mark.parametrize(("closed", "workers"), [(">&-", 1), ("2>&-", 1), ("<&- >&- 2>&-", 2)])

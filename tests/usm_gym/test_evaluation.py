@@ -9,14 +9,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+import usm_baselines
 from numpy.typing import NDArray
 
-import baselines
 import usm_gym
-from usm_gym import Inspection, Path, Robot, Scenario, Thruster, metrics
-from usm_gym.conditions import PRESETS
+from usm_gym import Inspection, Path, Robot, Scenario, Thruster
 from usm_gym.evaluation import METRICS, POSITION_METRICS, Evaluation, rollout
-from usm_gym.scenario import sample
+from usm_gym.task import metrics
+from usm_gym.task.conditions import PRESETS
+from usm_gym.task.scenario import sample
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def mixed() -> tuple[Scenario, ...]:
 
 
 def policy(id: str = "sta") -> Any:
-    return baselines.make(id, gym.make("USM-Operation-v0"))
+    return usm_baselines.make(id, gym.make("USM-Operation-v0"))
 
 
 @cache
@@ -152,7 +153,7 @@ def test_the_scores_are_those_of_the_environment_stepped_by_hand(id: str, k: int
     scenario = mixed()[k]
     env = gym.make(f"USM-{scenario.mode.capitalize()}-v0")
     observation, info = env.reset(options={"scenario": scenario})
-    by_name: Any = baselines.make(id, env)
+    by_name: Any = usm_baselines.make(id, env)
     state, errors, headings, commands, over = None, [], [], [], False
     while not over:
         action, state = by_name.predict(observation, state)
@@ -302,7 +303,7 @@ def test_another_robot_may_be_scored() -> None:
         settle_time=0.5,
     )
     env = gym.make("USM-Operation-v0", robot={"links": 4, "thrusters": robot.thrusters})
-    result = usm_gym.evaluate(baselines.make("sta", env), [scenario], robot=robot)
+    result = usm_gym.evaluate(usm_baselines.make("sta", env), [scenario], robot=robot)
     assert result.per_episode["max_error_x"][0] < 1e-3
     with pytest.raises(ValueError, match="action"):
         usm_gym.evaluate(Still(), [scenario], robot=robot)

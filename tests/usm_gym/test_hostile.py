@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
+from support.strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
 
 import usm_gym
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
-from usm_gym.conditions import conditions_of
-from usm_gym.env import USMEnv
-from usm_gym.nominal import nominal_of
+from usm_gym.envs.env import USMEnv
+from usm_gym.envs.vector_env import USMVectorEnv
 from usm_gym.robot import robot_of
-from usm_gym.scenario import MODES
-from usm_gym.validation import QUOTED, SAID
-from usm_gym.vector_env import USMVectorEnv
+from usm_gym.support.validation import QUOTED, SAID
+from usm_gym.task.conditions import conditions_of
+from usm_gym.task.nominal import nominal_of
+from usm_gym.task.scenario import MODES
 
 # Physics steps times links that an example may take.
 AFFORDABLE = 300_000

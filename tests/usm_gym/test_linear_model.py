@@ -8,9 +8,9 @@ from scipy.linalg import block_diag, solve_discrete_are
 
 import usm_gym
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, linear_model
-from usm_gym.nominal import nominal_of
 from usm_gym.plant import layout as rows
 from usm_gym.simulation import Simulation
+from usm_gym.task.nominal import nominal_of
 
 # Everything is nominal, the reference rests.
 CALM = Conditions(current_limit=0.0, coefficient_range=(1.0, 1.0), position_noise=0.0)

@@ -6,10 +6,10 @@ import typing
 
 import pytest
 from pydantic import TypeAdapter
+from usm_agents.artifact.folder import Agent
+from usm_agents.learning.plan import Plan
+from usm_baselines.gains import Budget, GainsFile
 
-from agents.artifact import Agent
-from agents.plan import Plan
-from baselines.gains import Budget, GainsFile
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
 
 CLASSES = [

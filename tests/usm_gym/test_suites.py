@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from usm_gym import suite
-from usm_gym.conditions import PRESETS
-from usm_gym.scenario import named, sample
-from usm_gym.seeding import EVALUATION, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.suites import NAMES
 from usm_gym.suites import __main__ as writer
+from usm_gym.support.seeding import EVALUATION, TRAINING, TUNING, VALIDATION, stream
+from usm_gym.task.conditions import PRESETS
+from usm_gym.task.scenario import named, sample
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from usm_gym.kernels.compile import piece
 from usm_gym.plant.layout import *
 from usm_gym.plant.motion import line_of_sight, path
 
-# The quantities of an observation in order; `usm_gym.observation` says what they are.
+# The quantities of an observation in order; `usm_gym.task.observation` says what they are.
 ENTRIES = (
     "position_error",
     "reference_velocity",

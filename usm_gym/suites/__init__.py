@@ -10,8 +10,10 @@ import json
 from functools import cache
 from importlib.resources import files
 
-from usm_gym.scenario import Scenario
-from usm_gym.validation import require
+from usm_gym.support.seeding import EVALUATION, stream
+from usm_gym.support.validation import require
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.scenario import Mode, Scenario, sample
 
 NAMES = ("operation", "operation-ideal", "operation-rough", "torpedo", "table1")
 
@@ -24,6 +26,11 @@ def suite(name: str) -> list[Scenario]:
     """
     require(name in NAMES, "suite", name, ", ".join(NAMES))
     return list(_read(name))
+
+
+def unseen(mode: Mode, conditions: Conditions, seed: int, episodes: int) -> list[Scenario]:
+    """Scenarios sampled under a seed, which no training and no tuning ever meets."""
+    return [sample(mode, conditions, stream(seed, EVALUATION, i)) for i in range(episodes)]
 
 
 @cache

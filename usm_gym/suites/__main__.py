@@ -6,12 +6,12 @@ import json
 import sys
 from pathlib import Path
 
-from usm_gym.conditions import PRESETS
-from usm_gym.files import write_text
-from usm_gym.scenario import MODES, Mode, Scenario, named, sample
-from usm_gym.seeding import SUITE, stream
 from usm_gym.suites import NAMES
-from usm_gym.validation import require
+from usm_gym.support.files import write_text
+from usm_gym.support.seeding import SUITE, stream
+from usm_gym.support.validation import require
+from usm_gym.task.conditions import PRESETS
+from usm_gym.task.scenario import MODES, Mode, Scenario, named, sample
 
 SEED = 20261122
 RECIPES: dict[str, tuple[Mode, str, int]] = {

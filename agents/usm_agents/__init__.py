@@ -1,0 +1,23 @@
+"""Learned residual thrust on top of the scripted policies, and the commands of `usm`.
+
+Importing this package registers the residual tasks and the shipped agents; it does not import
+torch.
+"""
+
+import gymnasium as gym
+
+from usm_agents.artifact.folder import register_shipped
+from usm_agents.residual.task import ResidualPolicy
+from usm_gym.task.scenario import MODES
+
+__all__ = ["ResidualPolicy"]
+
+for _mode in MODES:
+    gym.register(
+        id=f"USM-{_mode.capitalize()}Residual-v0",
+        entry_point="usm_agents.residual.env:make_residual_env",
+        vector_entry_point="usm_agents.residual.env:make_residual_vector_env",
+        kwargs={"mode": _mode},
+    )
+
+register_shipped()

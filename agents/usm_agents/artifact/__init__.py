@@ -1,0 +1,1 @@
+"""Files of trained agents, free of torch."""

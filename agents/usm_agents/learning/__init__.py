@@ -1,0 +1,1 @@
+"""Training of agents: all that imports torch."""

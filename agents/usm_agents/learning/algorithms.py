@@ -1,0 +1,128 @@
+"""The algorithms that train agents, and the settings of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium.spaces import Box
+from sb3_contrib import TQC, RecurrentPPO
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+from usm_agents.artifact.network import Network, Recurrence
+
+# Rewards are multiplied by this in training, so that returns are of order one.
+REWARD_SCALE = 0.1
+CLASSES: dict[str, type[BaseAlgorithm]] = {
+    "ppo": PPO,
+    "recurrent-ppo": RecurrentPPO,
+    "sac": SAC,
+    "td3": TD3,
+    "tqc": TQC,
+}
+ON_POLICY = ("ppo", "recurrent-ppo")
+# Robots side by side: for PPO a rollout is many robots by few steps, so that little time is spent
+# between steps; the others learn after each step of all.
+ROBOTS = {"ppo": 256, "recurrent-ppo": 256, "sac": 32, "td3": 32, "tqc": 32}
+
+_PPO: dict[str, Any] = {
+    "hidden": (128, 128),
+    "n_steps": 64,
+    "batch_size": 1024,
+    "n_epochs": 6,
+    "learning_rate": 5e-4,
+    "gamma": 0.97,
+    "gae_lambda": 0.95,
+    "target_kl": 0.03,
+    "log_std_init": -1.5,  # small exploration around the base
+}
+_OFF_POLICY: dict[str, Any] = {
+    "hidden": (64, 64),
+    "learning_rate": 5e-4,
+    "buffer_size": 300_000,
+    "learning_starts": 10_000,
+    "batch_size": 256,
+    "gamma": 0.97,
+    "train_freq": 1,
+    "gradient_steps": 2,
+}
+# Widths of the hidden layers, units of the memory before them, and arguments that are not defaults.
+# The rate of PPO falls linearly to a tenth over the training; TD3 explores with independent noise
+# of that deviation.
+SETTINGS: dict[str, dict[str, Any]] = {
+    "ppo": _PPO,
+    "recurrent-ppo": _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_epochs": 4},
+    "sac": _OFF_POLICY | {"ent_coef": "auto_0.01"},
+    "td3": _OFF_POLICY | {"noise": 0.2},
+    "tqc": _OFF_POLICY | {"ent_coef": "auto_0.01"},
+}
+
+
+@dataclass(frozen=True)
+class Falling:
+    """A learning rate that falls linearly to a tenth over the training."""
+
+    start: float
+
+    def __call__(self, remaining: float) -> float:
+        """The rate when this share of the training remains."""
+        return self.start * (0.1 + 0.9 * remaining)
+
+
+def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
+    """A new model, whose deterministic actions are nearly zero, so that the base acts as it is."""
+    arguments: dict[str, Any] = dict(SETTINGS[algorithm])
+    policy: dict[str, Any] = {"net_arch": list(arguments.pop("hidden"))}
+    kind = "MlpPolicy"
+    if algorithm == "recurrent-ppo":
+        kind, policy["lstm_hidden_size"] = "MlpLstmPolicy", arguments.pop("units")
+    if algorithm in ON_POLICY:
+        policy["activation_fn"] = nn.Tanh
+        policy["log_std_init"] = arguments.pop("log_std_init")
+        arguments["learning_rate"] = Falling(arguments["learning_rate"])
+    if algorithm == "td3":
+        assert isinstance(env.action_space, Box)
+        zero = np.zeros(env.action_space.shape)
+        noise = NormalActionNoise(zero, zero + arguments.pop("noise"))
+        arguments["action_noise"] = VectorizedActionNoise(noise, env.num_envs)
+    model = CLASSES[algorithm](kind, env, policy_kwargs=policy, device="cpu", **arguments)
+    with torch.no_grad():
+        last = _layers(algorithm, model)[-1]
+        last.weight.mul_(0.01)
+        last.bias.zero_()
+    return model
+
+
+def network_of(algorithm: str, model: Any) -> Network:
+    """The part of a model that acts, deterministically, without torch."""
+    layers = _layers(algorithm, model)
+    on_policy = algorithm in ON_POLICY
+    return Network(
+        tuple(layer.weight.detach().numpy().T.copy() for layer in layers),
+        tuple(layer.bias.detach().numpy().copy() for layer in layers),
+        "tanh" if on_policy else "relu",
+        "clip" if on_policy else "tanh",
+        _recurrence(model.policy.lstm_actor) if algorithm == "recurrent-ppo" else None,
+    )
+
+
+def _recurrence(lstm: nn.LSTM) -> Recurrence:
+    given, kept, one, other = (each.detach().numpy() for each in lstm.parameters())
+    return Recurrence(given.T.copy(), kept.T.copy(), one + other)
+
+
+def _layers(algorithm: str, model: Any) -> list[nn.Linear]:
+    policy = model.policy
+    if algorithm in ON_POLICY:
+        modules = [*policy.mlp_extractor.policy_net, policy.action_net]
+    elif algorithm == "td3":
+        modules = [*policy.actor.mu]
+    else:
+        modules = [*policy.actor.latent_pi, policy.actor.mu]
+    return [module for module in modules if isinstance(module, nn.Linear)]

@@ -1,0 +1,1 @@
+"""The residual task: an agent corrects the thrust of a base policy."""

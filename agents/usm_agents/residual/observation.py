@@ -1,0 +1,108 @@
+"""What the agent of the residual task sees: the table, which `residual_observer` fills."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from usm_baselines.laws.lqg import LQG, JointLQG
+from usm_baselines.laws.mpc import MPC
+from usm_baselines.laws.pd import PD
+from usm_baselines.laws.super_twisting import SuperTwisting
+
+from usm_gym.support.validation import require
+from usm_gym.task.observation import Entry, Layout
+
+_RATE = Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer")
+_DISTURBANCE = Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same")
+_REST = Entry("base_disturbance", 2, "m/s^2", 0.2, 4.0, "what the base's model leaves out")
+_INTEGRAL = Entry("base_integral", 2, "m/s^2", 2.0, 40.0, "v of the super-twisting law (11)")
+_ADAPTED = Entry("base_alpha", 2, "m^(1/2)/s^(3/2)", 50.0, 500.0, "alpha of the same")
+# The numbers of a law's state that the agent sees, by their index in each axis. Of a base that is
+# not listed it sees the command alone.
+BASE_STATES: dict[type, dict[int, Entry]] = {
+    SuperTwisting: {1: _RATE, 2: _DISTURBANCE, 4: _INTEGRAL, 5: _ADAPTED},
+    PD: {1: _RATE, 2: _DISTURBANCE},
+    LQG: {1: _RATE, 2: _REST},
+    JointLQG: {1: _RATE, 2: _REST},
+    MPC: {1: _RATE, 2: _REST},
+}
+
+
+@dataclass(frozen=True)
+class ResidualLayout(Layout):
+    """The layout of the residual task's observation; values beyond a bound are cut off at it.
+
+    Attributes:
+        thrusters: Number of thrusters.
+        actions: Number of numbers in an action.
+        base: Entries of the base's own state.
+        omit: Names of entries that are left out.
+        frames: How many observations are shown at once, the latest last.
+    """
+
+    thrusters: int
+    actions: int
+    base: tuple[Entry, ...]
+    omit: tuple[str, ...] = ()
+    frames: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse names of no entry."""
+        known = [entry.name for entry in self.complete]
+        for name in self.omit:
+            require(name in known, "omit", name, ", ".join(known))
+        number = isinstance(self.frames, int) and self.frames >= 1
+        require(number, "frames", self.frames, "an integer >= 1")
+
+    @property
+    def complete(self) -> tuple[Entry, ...]:
+        """All entries that a frame can have, in order."""
+        return (
+            Entry("position_error", 2, "m", 0.002, 0.02, "as measured (x, y)"),
+            Entry("reference_velocity", 2, "m/s", 0.1, 1.0, "velocity of the reference (x, y)"),
+            Entry("reference_acceleration", 2, "m/s^2", 0.02, 0.2, "its acceleration"),
+            Entry("estimated_error", 2, "m", 0.002, 0.02, "error, by the Kalman filter"),
+            Entry("estimated_rate", 2, "m/s", 0.04, 0.4, "its rate, by the same"),
+            Entry("estimated_disturbance", 2, "m/s^2", 0.2, 4.0, "disturbance, by the same"),
+            Entry("estimated_thrust", 2, "m/s^2", 1.0, 20.0, "thrust over inertia, by the same"),
+            Entry("innovation", 2, "m", 2e-4, 4e-3, "measurement less its prediction, by the same"),
+            *self.base,
+            Entry("base_force", 2, "N", 40.0, 400.0, "the base's force, before saturation"),
+            Entry("base_moment", 1, "N m", 5.0, 100.0, "the base's moment, before saturation"),
+            Entry(
+                "thruster_command",
+                self.thrusters,
+                "1",
+                1.0,
+                1.1,
+                "last command over the limit, after saturation",
+            ),
+            Entry("last_action", self.actions, "1", 1.0, 1.0, "the agent's last action"),
+            Entry("heading", 1, "rad", 0.5, 10.0, "mean link angle, never wrapped"),
+            Entry("heading_error", 1, "rad", 0.1, 1.0, "heading less its reference"),
+            Entry("heading_rate", 1, "rad/s", 0.2, 4.0, "rate of the heading"),
+            Entry("deflection", 1, "rad", 1.0, 10.0, "sum of the joint angles"),
+            Entry("deflection_rate", 1, "rad/s", 2.0, 40.0, "its rate"),
+            Entry("reference_deflection", 1, "rad", 1.0, 10.0, "sum of the joint references"),
+            Entry("reference_deflection_rate", 1, "rad/s", 2.0, 40.0, "its rate"),
+            Entry(
+                "reference_deflection_acceleration", 1, "rad/s^2", 50.0, 1000.0, "its acceleration"
+            ),
+            Entry("bending_joints", 1, "1", 10.0, 100.0, "how many joints are asked to bend"),
+        )
+
+    @cached_property
+    def frame(self) -> tuple[Entry, ...]:
+        """The entries of one frame, in order."""
+        return tuple(entry for entry in self.complete if entry.name not in self.omit)
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """All entries in order; those of earlier frames have their age in the name."""
+        earlier = [
+            replace(entry, name=f"{entry.name}[-{age}]")
+            for age in range(self.frames - 1, 0, -1)
+            for entry in self.frame
+        ]
+        return (*earlier, *self.frame)

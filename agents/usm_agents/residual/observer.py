@@ -1,0 +1,289 @@
+"""Fills in the residual task's observation: one kernel for one robot, for many, for the policy."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from usm_baselines.estimation.prediction import ESTIMATES
+from usm_baselines.laws.policy import ScriptedPolicy
+from usm_baselines.signals import Signals
+
+from usm_agents.residual.observation import BASE_STATES, ResidualLayout
+from usm_gym.kernels.compile import compiled, piece, shared
+from usm_gym.plant.measure import (
+    HEADING_ERROR,
+    JOINT_ANGLES,
+    JOINT_RATES,
+    JOINT_REFERENCE_ACCELERATIONS,
+    JOINT_REFERENCE_RATES,
+    JOINT_REFERENCES,
+    TAIL_ANGLE,
+    TAIL_RATE,
+    THRUSTER_COMMAND,
+    THRUSTER_LIMIT,
+    value,
+)
+from usm_gym.policy import Policy
+from usm_gym.task.observation import ObservationLayout
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# The entries that do not depend on the base, by name: the number of each among them, in the order
+# of the table.
+_NAMES = [entry.name for entry in ResidualLayout(thrusters=1, actions=1, base=()).complete]
+ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
+
+
+class Plain(NamedTuple):
+    """How the plain observation is read, see `usm_gym.plant.measure.value`.
+
+    Attributes:
+        starts: First index of each entry.
+        scale: Physical value over observed value of each number.
+    """
+
+    starts: NDArray[np.int64]
+    scale: Array
+
+
+class Table(NamedTuple):
+    """The layout of the agent's observation, for the kernel.
+
+    Attributes:
+        starts: Where each of `ENTRY` begins in a complete frame.
+        base: Place in it of each shown number of the base's state, and column there, (numbers, 2).
+        shown: Which numbers of a complete frame are shown, in order.
+        scale: Physical value over observed value of each number of the observation.
+        bound: Bound of each observed number, float32.
+        complete: How many numbers a complete frame has.
+    """
+
+    starts: NDArray[np.int64]
+    base: NDArray[np.int64]
+    shown: NDArray[np.int64]
+    scale: Array
+    bound: NDArray[np.float32]
+    complete: int
+
+
+# The shipped agents were trained on sums as numpy.sum and numpy.einsum make them. Their order is
+# kept here, and that they are never -0.0: what an agent sees has the same bits.
+
+
+@shared
+def unsigned(total):
+    """A sum without the sign of its zero; not a `piece`, whose flags let the compiler drop this."""
+    return total if total != 0.0 else 0.0
+
+
+@piece
+def add_up(terms):
+    """The sum of `terms`, which it overwrites, pairwise."""
+    first = 1
+    if terms.size >= 8:
+        first = terms.size // 8 * 8
+        for i in range(8, first):
+            terms[i % 8] += terms[i]
+        for step in (1, 2, 4):
+            for i in range(0, 8, 2 * step):
+                terms[i] += terms[i + step]
+    for i in range(first, terms.size):
+        terms[0] += terms[i]
+    return unsigned(terms[0])
+
+
+@piece
+def over_joints(seen, plain, entry, terms):
+    """Sum of a quantity over the joints; `terms` is room for a number of each."""
+    for i in range(terms.size):
+        terms[i] = value(seen, plain, entry, i)
+    return add_up(terms)
+
+
+@piece
+def tail_over_mean(seen, plain, entry, terms):
+    """The tail's angle over the mean of all links', from the joints' angles; of rates likewise.
+
+    Joint i turns the links after it.
+    """
+    joints = terms.size
+    for i in range(joints):
+        terms[i] = (joints - i) / (joints + 1) * value(seen, plain, entry, i)
+    return add_up(terms)
+
+
+@piece
+def fill_axes(frame, starts, signals, estimates, innovation, b):
+    """Fill in what is measured and estimated in each axis."""
+    for axis in range(2):
+        error, rate, disturbance, thrust = estimates[b, axis]
+        frame[starts[ENTRY.position_error] + axis] = signals.y[b, axis]
+        frame[starts[ENTRY.reference_velocity] + axis] = signals.velocity[b, axis]
+        frame[starts[ENTRY.reference_acceleration] + axis] = signals.acceleration[b, axis]
+        frame[starts[ENTRY.estimated_error] + axis] = error
+        frame[starts[ENTRY.estimated_rate] + axis] = rate
+        frame[starts[ENTRY.estimated_disturbance] + axis] = disturbance
+        frame[starts[ENTRY.estimated_thrust] + axis] = thrust
+        frame[starts[ENTRY.innovation] + axis] = innovation[b, axis]
+
+
+@piece
+def fill_wrench(frame, starts, seen, plain, T, action):
+    """Fill in the wrench that the base asks for, thrusters of even and odd place added up apart."""
+    limit = value(seen, plain, THRUSTER_LIMIT, 0)
+    for row in range(3):
+        even, odd = 0.0, 0.0
+        for j in range(0, action.size, 2):
+            even += T[row, j] * (action[j] * limit)
+        for j in range(1, action.size, 2):
+            odd += T[row, j] * (action[j] * limit)
+        at = starts[ENTRY.base_force] + row if row < 2 else starts[ENTRY.base_moment]
+        frame[at] = unsigned(even + odd)
+
+
+@piece
+def fill_posture(frame, starts, seen, plain, terms):
+    """Fill in heading and joint motion."""
+    tail, rate = value(seen, plain, TAIL_ANGLE, 0), value(seen, plain, TAIL_RATE, 0)
+    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, JOINT_ANGLES, terms)
+    frame[starts[ENTRY.heading_error]] = value(seen, plain, HEADING_ERROR, 0)
+    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(seen, plain, JOINT_RATES, terms)
+    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, JOINT_ANGLES, terms)
+    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, JOINT_RATES, terms)
+    reference = starts[ENTRY.reference_deflection]
+    frame[reference] = over_joints(seen, plain, JOINT_REFERENCES, terms)
+    reference = starts[ENTRY.reference_deflection_rate]
+    frame[reference] = over_joints(seen, plain, JOINT_REFERENCE_RATES, terms)
+    reference = starts[ENTRY.reference_deflection_acceleration]
+    frame[reference] = over_joints(seen, plain, JOINT_REFERENCE_ACCELERATIONS, terms)
+    bending = 0.0
+    for i in range(terms.size):
+        if value(seen, plain, JOINT_REFERENCES, i) != 0.0:
+            bending += 1.0
+    frame[starts[ENTRY.bending_joints]] = bending
+
+
+@compiled
+def show(
+    table, plain, signals, estimates, innovation, action, state, last, start, past, seen, kept
+):
+    """Fill in the observations `seen` and the frames `kept` of a batch; see `ResidualObserver`."""
+    joints = plain.starts[JOINT_RATES] - plain.starts[JOINT_ANGLES]
+    frame, terms = np.empty(table.complete), np.empty(joints)
+    starts, width = table.starts, table.shown.size
+    for b in range(seen.shape[0]):
+        measured = signals.observation[b]
+        fill_axes(frame, starts, signals, estimates, innovation, b)
+        for k in range(table.base.shape[0]):
+            frame[table.base[k, 0]] = state[b, table.base[k, 1]]
+        fill_wrench(frame, starts, measured, plain, signals.allocation[b], action[b])
+        for j in range(action.shape[1]):
+            command = value(measured, plain, THRUSTER_COMMAND, j)
+            frame[starts[ENTRY.thruster_command] + j] = command
+        for i in range(last.shape[1]):
+            frame[starts[ENTRY.last_action] + i] = 0.0 if start[b] else last[b, i]
+        fill_posture(frame, starts, measured, plain, terms)
+        for k in range(seen.shape[1]):
+            earlier = k < past.shape[1] and not start[b]
+            number = past[b, k] if earlier else frame[table.shown[k % width]]
+            bound = table.bound[k]
+            seen[b, k] = min(max(number / table.scale[k], -bound), bound)
+            if k >= width:
+                kept[b, k - width] = number
+
+
+class ResidualObserver:
+    """Makes the agent's observation from what is measured and estimated, for a batch.
+
+    Attributes:
+        layout: The table.
+        earlier: How many numbers are kept of earlier frames.
+    """
+
+    def __init__(
+        self,
+        base: Policy,
+        plain: ObservationLayout,
+        actions: int,
+        omit: tuple[str, ...],
+        frames: int,
+    ) -> None:
+        """Take the base, whose state is shown, and the layout of the plain observation."""
+        shown = BASE_STATES.get(type(base), {})
+        entries = tuple(shown.values())
+        self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
+        whole = ResidualLayout(plain.thrusters, actions, entries)
+        numbers, slices = np.arange(whole.size), whole.slices
+        places = np.array([numbers[slices[entry.name]] for entry in entries], np.int64)
+        columns = _columns(base, list(shown)) if shown else np.empty(0, np.int64)
+        self._table = Table(
+            starts=np.array([slices[name].start for name in ENTRY._fields]),
+            base=np.stack([places.ravel(), columns], axis=1),
+            shown=np.concatenate([numbers[slices[entry.name]] for entry in self.layout.frame]),
+            scale=self.layout.scale,
+            bound=self.layout.bound,
+            complete=whole.size,
+        )
+        self._plain = Plain(plain.starts, plain.scale)
+        self.earlier = self.layout.size - len(self._table.shown)
+
+    def update(
+        self,
+        signals: Signals,
+        estimates: Array,
+        innovation: Array,
+        base_action: NDArray[np.float32],
+        base_state: Any,
+        last_action: NDArray[np.float32],
+        past: Array,
+        start: Flags,
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Make the observations of a batch.
+
+        Args:
+            signals: What was measured.
+            estimates: (e, v, d, f) of each axis by `Estimator`, (batch, 2, 4).
+            innovation: Its innovations, m, (batch, 2).
+            base_action: The base's commands over the limit, not clipped, (batch, thrusters).
+            base_state: The base's state after that.
+            last_action: The agent's last action, (batch, actions).
+            past: The earlier frames, which the last call returned, (batch, earlier).
+            start: Where an episode starts, so that there is nothing earlier, (batch,).
+
+        Returns:
+            The agent's observations, (batch, layout.size), and the frames for the next call.
+        """
+        size = len(base_action)
+        seen = np.empty((size, self.layout.size), np.float32)
+        kept = np.empty((size, self.earlier))
+        show(
+            self._table,
+            self._plain,
+            signals,
+            estimates,
+            innovation,
+            base_action,
+            base_state if len(self._table.base) else _NOTHING,
+            last_action,
+            start,
+            past,
+            seen,
+            kept,
+        )
+        return seen, kept
+
+
+_NOTHING = np.empty((0, 0))
+
+
+def _columns(base: Policy, indices: list[int]) -> NDArray[np.int64]:
+    """Columns of the base's state with those numbers of the axes, (2 * indices,)."""
+    assert isinstance(base, ScriptedPolicy)
+    columns = base.law_columns
+    if columns.ndim == 1:  # a predictor's: (e, v, d) of x and of y come first
+        columns = columns[:ESTIMATES].reshape(2, -1)
+    return columns[:, indices].T.ravel()

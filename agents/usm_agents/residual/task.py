@@ -1,0 +1,251 @@
+"""The residual task: a learned correction of the thrust that a base policy commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+from usm_baselines.contender import contender
+from usm_baselines.estimation.estimator import Estimator
+
+from usm_agents.residual.observer import ResidualObserver
+from usm_gym.kernels.compile import compiled
+from usm_gym.plant.thrusters import allocate
+from usm_gym.policy import Policy
+from usm_gym.support.validation import Count, Number, is_whole, require
+from usm_gym.task.nominal import Nominal
+from usm_gym.task.observation import ObservationLayout
+
+Array = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+ActionKind = Literal["wrench", "thrusters"]
+# The limit of a thruster: less slows learning down, more buys error with chattering.
+RESIDUAL_SCALE = 20.0
+# N and N m: the limit of the strongest thruster that conditions allow.
+LEAST_RESIDUAL, LARGEST_RESIDUAL = 1e-6, 1000.0
+MOST_FRAMES = 100
+
+ResidualScale = Annotated[Number, Field(ge=LEAST_RESIDUAL, le=LARGEST_RESIDUAL)]
+Frames = Annotated[Count, Field(le=MOST_FRAMES)]
+
+
+class Memory(NamedTuple):
+    """What the residual task keeps from one control instant to the next, the batch first.
+
+    Attributes:
+        limit: Thruster limits, N, (batch,).
+        allocation: Allocation matrices, (batch, 3, thrusters).
+        base_action: The base's commands over the limit, not clipped, (batch, thrusters).
+        base_state: State of the base.
+        estimator_state: State of the Kalman filter beside it, (batch, numbers).
+        frames: Earlier frames of the observation, physical values, (batch, numbers).
+        action: The agent's last action, (batch, actions).
+    """
+
+    limit: NDArray[np.float64]
+    allocation: NDArray[np.float64]
+    base_action: Array
+    base_state: Any
+    estimator_state: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    action: Array
+
+
+@compiled
+def correct_all(base_action, allocation, limit, residual, wrench, command):  # type: ignore[no-untyped-def]
+    """Fill in the commands over the limit, (batch, thrusters): the base's and a residual's.
+
+    Residuals are wrenches (N, N, N m), which thruster forces of least norm make, or forces, N.
+    """
+    forces = np.empty(base_action.shape[1])
+    for b in range(len(command)):
+        if wrench:
+            allocate(allocation[b], residual[b, 0], residual[b, 1], residual[b, 2], forces)
+        else:
+            forces[:] = residual[b]
+        for j in range(forces.size):
+            command[b, j] = base_action[b, j] + forces[j] / limit[b]
+
+
+class Residual:
+    """Base policy and residual, for a batch of robots: all that single, vector and policy share.
+
+    Attributes:
+        nominal: What is known of the robot.
+        layout: Layout of the agent's observation.
+        actions: How many numbers an action has.
+    """
+
+    def __init__(
+        self,
+        nominal: Nominal,
+        base: str | Policy = "sta",
+        residual_scale: float = RESIDUAL_SCALE,
+        action: ActionKind = "wrench",
+        omit: Sequence[str] = (),
+        frames: int = 1,
+    ) -> None:
+        """Make the base.
+
+        Args:
+            nominal: What is known of the robot.
+            base: The base policy: a name as `--policies` takes it, or the policy itself.
+            residual_scale: Largest residual force in each axis or of each thruster, N, and largest
+                residual moment, N m; 1e-6 to 1000.
+            action: "wrench" or "thrusters".
+            omit: Entries of the observation that the agent is not shown, by name.
+            frames: How many observations the agent sees at once, the latest last, 1 to 100.
+
+        Raises:
+            ValueError: If the base is unknown or an argument not allowed.
+        """
+        kinds = get_args(ActionKind)
+        require(action in kinds, "action", action, " or ".join(kinds))
+        require(
+            isinstance(residual_scale, (int, float))
+            and LEAST_RESIDUAL <= residual_scale <= LARGEST_RESIDUAL,
+            "residual_scale",
+            residual_scale,
+            f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
+        )
+        require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
+        if isinstance(base, str):
+            named = contender(base)
+            require(not named.privileged, "base", base, "a policy that is not given true state")
+            base = named.make(nominal)
+        self.nominal = nominal
+        self.base = base
+        self._scale, self._action = float(residual_scale), action
+        plain = ObservationLayout(nominal.robot.links, len(nominal.robot.thrusters))
+        self._limit = plain.slices["thruster_limit"].start
+        self._limit_scale = plain.scale[self._limit]
+        self.actions = 3 if action == "wrench" else plain.thrusters
+        self._estimator = Estimator(nominal)
+        self._observer = ResidualObserver(base, plain, self.actions, tuple(omit), frames)
+        self.layout = self._observer.layout
+
+    @property
+    def action_space(self) -> gym.Space[Array]:
+        """The action space."""
+        return gym.spaces.Box(-1.0, 1.0, (self.actions,), np.float32)
+
+    def observe(
+        self, observation: Array, memory: Memory | None, start: Flags
+    ) -> tuple[Array, Memory]:
+        """Let the base act, and make the agent's observations.
+
+        Args:
+            observation: Plain observations, (batch, numbers).
+            memory: What `command` returned; None at the start, of all episodes then.
+            start: Where an episode starts, (batch,).
+
+        Returns:
+            Observations, (batch, layout.size), and what to keep.
+        """
+        size = len(observation)
+        if memory is None:
+            start = np.ones(size, bool)
+            base_state, filtered = None, None
+            action = np.zeros((size, self.actions), np.float32)
+            past = np.empty((size, self._observer.earlier))
+        else:
+            base_state, filtered = memory.base_state, memory.estimator_state
+            action, past = memory.action, memory.frames
+        base_action, base_state = self.base.predict(observation, base_state, start, True)
+        base_action = np.ascontiguousarray(base_action, np.float32)
+        signals, estimates, innovation, filtered = self._estimator.update(
+            observation, filtered, start
+        )
+        seen, frames = self._observer.update(
+            signals, estimates, innovation, base_action, base_state, action, past, start
+        )
+        limit = observation[:, self._limit] * self._limit_scale
+        return seen, Memory(
+            limit, signals.allocation, base_action, base_state, filtered, frames, action
+        )
+
+    def command(self, memory: Memory, action: Array) -> tuple[Array, Memory]:
+        """Add residuals to the base's commands; the plant saturates the sum, once.
+
+        Args:
+            memory: What `observe` returned.
+            action: The agent's actions, (batch, actions); values beyond [-1, 1] saturate.
+
+        Returns:
+            Thruster commands over the limit, (batch, thrusters), and what to keep.
+        """
+        action = action.clip(-1.0, 1.0)
+        command = np.empty_like(memory.base_action)
+        correct_all(
+            memory.base_action,
+            memory.allocation,
+            memory.limit,
+            self._scale * action.astype(np.float64),
+            self._action == "wrench",
+            command,
+        )
+        return command, memory._replace(action=action)
+
+
+class ResidualPolicy:
+    """Base policy and agent as one policy of the plain environment.
+
+    Attributes:
+        nominal: What the policy knows of the robot.
+        base: The base policy.
+        privileged: Never, here.
+    """
+
+    privileged = False
+
+    def __init__(
+        self,
+        residual: Residual | gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any],
+        agent: Policy,
+    ) -> None:
+        """Join the two.
+
+        Args:
+            residual: The residual task as in training, or its environment, single or vector.
+            agent: What was trained on it, with `predict`; a model of Stable-Baselines3 will do.
+
+        Raises:
+            ValueError: If `residual` is neither.
+        """
+        self._residual, self._agent = _task(residual), agent
+        self.nominal, self.base = self._residual.nominal, self._residual.base
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: tuple[Memory, Any] | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, tuple[Memory, Any]]:
+        """Act on one observation or a batch; see `ScriptedPolicy.predict`."""
+        plain = np.asarray(observation, np.float32)
+        batch = np.atleast_2d(plain)
+        memory, agent_state = state or (None, None)
+        start = np.full(len(batch), memory is None)
+        if episode_start is not None:
+            start |= np.asarray(episode_start, bool)
+        seen, memory = self._residual.observe(batch, memory, start)
+        action, agent_state = self._agent.predict(seen, agent_state, start, deterministic)
+        command, memory = self._residual.command(memory, np.asarray(action, np.float32))
+        return (command if plain.ndim == 2 else command[0]), (memory, agent_state)
+
+
+def _task(env: Any) -> Residual:
+    """The residual task of an environment, whatever it is wrapped in."""
+    inner = env
+    while not hasattr(inner, "residual") and hasattr(inner, "env"):
+        inner = inner.env
+    task = getattr(inner, "residual", inner)
+    require(isinstance(task, Residual), "residual", env, "an environment of the residual task")
+    assert isinstance(task, Residual)
+    return task

@@ -1,0 +1,167 @@
+"""What an agent does to its base: forces of both beside the force that was needed.
+
+The needed force is that of the oracle in the same episode, which knows the true plant and the
+future and holds the robot to some micrometres. What the base commands beyond it is chattering and
+error; a residual that takes all of it back is `needed - base`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from usm_baselines.benchmark.scoring import shared_nominal
+from usm_baselines.estimation.estimator import Estimator
+from usm_baselines.laws.oracle import Oracle
+
+from usm_agents.artifact.folder import make_agent
+from usm_agents.learning.plan import TEST_SEED
+from usm_agents.residual.task import Memory, ResidualPolicy
+from usm_agents.study.plans import AGENTS
+from usm_agents.study.trainings import Run
+from usm_gym.evaluation import rollout
+from usm_gym.policy import Policy
+from usm_gym.robot import Robot
+from usm_gym.suites import unseen
+from usm_gym.task.conditions import FIELD
+from usm_gym.task.nominal import Nominal
+from usm_gym.task.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+# Longest shift in time that is tried between two forces, control periods.
+LONGEST_SHIFT = 10
+# Episodes of each agent.
+EPISODES = 16
+# Samples of a segment of Welch's method: 0.1 Hz apart at 50 Hz.
+SEGMENT = 500
+
+
+class Recorder:
+    """A policy that keeps the forces it commands, in x and y in the global frame, N.
+
+    Attributes:
+        total: Commanded force of each step, before saturation, each (batch, 2).
+        base: Of which the base's, where the policy is a base with an agent.
+    """
+
+    def __init__(self, nominal: Nominal, policy: Policy, limit: float) -> None:
+        """Watch a policy; `limit` is that of the thrusters, N."""
+        self.nominal, self._limit = nominal, limit
+        self.privileged = getattr(policy, "privileged", False)
+        self.total: list[Array] = []
+        self.base: list[Array] = []
+        self._policy = policy
+        self._estimator = Estimator(nominal)
+        self._estimates: Array | None = None
+
+    def predict(
+        self, observation: Any, state: Any, start: Any, deterministic: bool = True, **truth: Any
+    ) -> tuple[Any, Any]:
+        """Act as the policy does."""
+        action, state = self._policy.predict(observation, state, start, deterministic, **truth)
+        signals, _, _, self._estimates = self._estimator.update(observation, self._estimates, start)
+        memory = state[0] if isinstance(state, tuple) else None
+        forces = signals.allocation[:, :2]
+        self.total.append(np.einsum("bwt,bt->bw", forces, action * self._limit))
+        if isinstance(memory, Memory):
+            self.base.append(np.einsum("bwt,bt->bw", forces, memory.base_action * self._limit))
+        return action, state
+
+
+def dissect(
+    policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenario]
+) -> dict[str, Any]:
+    """Forces of base, residual and both, beside the needed one.
+
+    Args:
+        policy: A base with an agent.
+        nominal: What both were made from.
+        scenarios: Episodes of one length and one thruster limit.
+
+    Returns:
+        Of each axis: standard deviation of each force, N, also of the base's when it acts alone;
+        the share of base - needed that the residual takes back, and the share of needed that it
+        adds, by least squares, with the share of the residual's variance which the two explain; by
+        how many seconds the whole force is late behind the needed one, by the largest correlation;
+        and power spectral densities, N^2/Hz, over the frequencies, Hz.
+    """
+    limit = scenarios[0].conditions.thruster_limit
+    settled = round(scenarios[0].settle_time / nominal.control_period)
+    watched = []
+    for each in (policy, policy.base, Oracle(nominal)):
+        recorder = Recorder(nominal, each, limit)
+        rollout(recorder, scenarios, Robot())
+        watched.append(recorder)
+    total, alone, needed = (np.stack(recorder.total)[settled:] for recorder in watched)
+    base = np.stack(watched[0].base)[settled:]
+    forces = {
+        "needed": needed,
+        "base alone": alone,
+        "base": base,
+        "residual": total - base,
+        "both": total,
+    }
+    frequency = welch(needed, nominal.control_period)[0]
+    return {
+        "frequency": frequency.tolist(),
+        **{
+            axis: axis_of({name: force[..., k] for name, force in forces.items()}, nominal)
+            for k, axis in enumerate("xy")
+        },
+    }
+
+
+def axis_of(forces: dict[str, Array], nominal: Nominal) -> dict[str, Any]:
+    """What `dissect` finds in one axis; forces as (steps, episodes)."""
+    needed, residual = forces["needed"], forces["residual"]
+    excess = forces["base"] - needed
+    parts = np.stack([-excess.ravel(), needed.ravel()], axis=1)
+    shares, *_ = np.linalg.lstsq(parts, residual.ravel(), rcond=None)
+    left = residual.ravel() - parts @ shares
+    return {
+        "deviation": {name: float(force.std()) for name, force in forces.items()},
+        "excess_taken_back": float(shares[0]),
+        "needed_added": float(shares[1]),
+        "explained": 1.0 - float(left.var() / residual.var()),
+        "lateness": lateness(forces["both"], needed) * nominal.control_period,
+        "spectrum": {
+            name: welch(force, nominal.control_period)[1].mean(axis=1).tolist()
+            for name, force in forces.items()
+        },
+    }
+
+
+def lateness(force: Array, needed: Array) -> int:
+    """By how many steps a force is best moved back for it to be like the needed one."""
+    span = range(-LONGEST_SHIFT, LONGEST_SHIFT + 1)
+    inner = needed[LONGEST_SHIFT:-LONGEST_SHIFT]
+    length = len(inner)
+    return max(
+        span,
+        key=lambda shift: float(
+            np.corrcoef(force[LONGEST_SHIFT + shift :][:length].ravel(), inner.ravel())[0, 1]
+        ),
+    )
+
+
+def welch(force: Array, period: float) -> tuple[Array, Array]:
+    """Welch's power spectral density over the first axis."""
+    from scipy import signal
+
+    frequency, density = signal.welch(force, 1.0 / period, nperseg=SEGMENT, axis=0)
+    return frequency, density
+
+
+def dissected(chosen: Sequence[Run]) -> dict[str, Any]:
+    """What each agent, as its seed 0, does to its base; see `dissect`."""
+    found = {}
+    for run in chosen:
+        if run.name in AGENTS and run.plan.seed == 0:
+            episodes = unseen(run.plan.mode, FIELD, TEST_SEED, EPISODES)
+            nominal = shared_nominal(Robot(), episodes)
+            policy = make_agent(nominal, str(run.folder))
+            found[run.name] = dissect(policy, nominal, episodes)
+    return found

@@ -1,0 +1,153 @@
+"""The trainings of a study, and the agents that are shipped of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from usm_agents.artifact.folder import read_agent, write_agent
+from usm_agents.learning.checkpoint import CURVE, Point, traces
+from usm_agents.learning.plan import Plan, read_plan
+from usm_agents.learning.training import VALIDATED, train
+from usm_agents.study.plans import AGENTS, PLANS, SEEDS
+from usm_gym.support import parallel
+from usm_gym.support.files import read_json
+from usm_gym.support.validation import require
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """One training of the study.
+
+    Attributes:
+        name: Name of the agent or ablation.
+        plan: What is trained.
+        folder: Where.
+    """
+
+    name: str
+    plan: Plan
+    folder: Path
+
+    @property
+    def begun(self) -> bool:
+        """Whether the folder holds this training, or its beginning; no checkpoint is opened.
+
+        Raises:
+            ValueError: If it holds a training of another plan, or one without a plan.
+        """
+        if not traces(self.folder):
+            return False
+        name = self.folder.name
+        had, has = read_plan(self.folder).command(name), self.plan.command(name)
+        require(had == has, f"the training in {self.folder}", had, has)
+        return True
+
+    @property
+    def done(self) -> bool:
+        """Whether the training has come to its end.
+
+        Raises:
+            ValueError: If the folder holds another one; see `begun`.
+        """
+        if not (self.begun and (self.folder / CURVE).exists()):
+            return False
+        return bool(self.curve[-1]["steps"] >= self.plan.steps)
+
+    @property
+    def curve(self) -> list[Point]:
+        """The learning curve, as far as it goes.
+
+        Raises:
+            ValueError: If the file holds none.
+        """
+        curve = read_json(self.folder / CURVE)
+        valid = isinstance(curve, list) and curve and all(map(is_point, curve))
+        require(valid, f"file {self.folder / CURVE}", curve, "a learning curve")
+        known: list[Point] = curve
+        return known
+
+
+def is_point(value: Any) -> bool:
+    """Whether a value is what a validation found."""
+    names = ("steps", "seconds", *VALIDATED, "failures")
+    return isinstance(value, dict) and all(
+        isinstance(value.get(name), (int, float)) for name in names
+    )
+
+
+def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = None) -> list[Run]:
+    """The trainings of the study, seed by seed, so that an early stop leaves some of each.
+
+    Args:
+        names: Names of agents and ablations.
+        seeds: How many seeds, from 0 on, and no more than `SEEDS` of each.
+        folder: Folder of the study.
+        steps: How many steps each is trained; without it, as its plan says.
+
+    Raises:
+        ValueError: If a name is unknown.
+    """
+    found = []
+    for seed in range(seeds):
+        for name in names:
+            require(name in PLANS, "--only", name, ", ".join(PLANS))
+            if seed >= SEEDS[name]:
+                continue
+            plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
+            found.append(Run(name, plan, folder / "runs" / f"{name}-{seed}"))
+    return found
+
+
+def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], object]) -> None:
+    """Train what is not trained yet; an interrupted training goes on where it was.
+
+    Only a training of the very plan goes on: its checkpoint is code, which is run.
+
+    Raises:
+        ValueError: If a folder holds another training; then none has begun.
+    """
+    waiting = []
+    for run in chosen:
+        if run.done:
+            report(run)
+        else:
+            waiting.append(run)
+    for index, _ in parallel.results(train_one, [(run,) for run in waiting], workers):
+        report(waiting[index])
+
+
+def train_one(run: Run) -> None:
+    """Carry out one training."""
+    train(run.plan, run.folder, lambda steps, line: None, resume=run.begun)
+
+
+def ship(chosen: Sequence[Run], folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Put each agent, as its seed 0, under its own name into a folder.
+
+    Args:
+        chosen: The trainings.
+        folder: Where; each agent has a folder of its own there.
+        provenance: Of the study.
+    """
+    for run in chosen:
+        if run.name not in AGENTS or run.plan.seed != 0:
+            continue
+        agent, network = read_agent(run.folder)
+        given = ("activation", "output", "weights")
+        description = {
+            field.name: getattr(agent, field.name)
+            for field in dataclasses.fields(agent)
+            if field.name not in given
+        }
+        trained = agent.training["provenance"]
+        description["training"] = {
+            **agent.training,
+            "command": run.plan.command(run.name),
+            "provenance": {**trained, "command": provenance["command"]},
+        }
+        tested = {**agent.scores["sampled"], "command": run.plan.test_command(run.name)}
+        description["scores"] = {**agent.scores, "sampled": tested}
+        write_agent(folder / run.name, description, network)

@@ -1,0 +1,1 @@
+"""Scores of many policies: leaderboard, robustness, tuning."""

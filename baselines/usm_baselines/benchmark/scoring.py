@@ -1,0 +1,257 @@
+"""Many policies on many scenarios: independent tasks, each kept in a file as soon as it is done.
+
+What a controller does wrong costs its own row and no other: it is refused with the reason.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import signal
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn
+
+import numpy as np
+from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass as pydantic_dataclass
+
+from usm_baselines.contender import Contender
+from usm_gym.evaluation import METRICS, Evaluation, evaluate, joined
+from usm_gym.policy import Policy
+from usm_gym.robot import Robot
+from usm_gym.support import parallel
+from usm_gym.support.files import read_json, write_json
+from usm_gym.support.validation import CONFIG, Number, Switch, in_one_line, require
+from usm_gym.task.nominal import Nominal, nominal_of
+from usm_gym.task.scenario import Scenario
+
+# Episodes that a policy meets side by side; a multiple of the plant's lanes.
+BATCH = 64
+# How long the code of others may think in a batch, s.
+TIME_LIMIT, LONGEST_TIME = 240.0, 1e6
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a policy has no score.
+
+    Attributes:
+        reason: In one line.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A policy and the scenarios on which it is scored.
+
+    Attributes:
+        contender: The policy.
+        scenarios: The episodes.
+        nominal: The knowledge from which the policy is made.
+        robot: The robot.
+        time_limit: How long a policy whose code is not known may think in a batch, s.
+    """
+
+    contender: Contender
+    scenarios: tuple[Scenario, ...]
+    nominal: Nominal
+    robot: Robot = dataclasses.field(default_factory=Robot)
+    time_limit: float = TIME_LIMIT
+
+    def __post_init__(self) -> None:
+        """Refuse a time limit that leaves no time."""
+        allowed = f"more than 0, up to {LONGEST_TIME:g} s"
+        require(0 < self.time_limit <= LONGEST_TIME, "time_limit", self.time_limit, allowed)
+
+    @property
+    def key(self) -> str | None:
+        """A hash of all that the scores depend on; None where that is not known."""
+        if self.contender.identity is None:
+            return None
+        parts = [
+            self.contender.identity,
+            [scenario.to_dict() for scenario in self.scenarios],
+            dataclasses.asdict(self.nominal),
+            dataclasses.asdict(self.robot),
+        ]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def shared_nominal(robot: Robot, scenarios: Sequence[Scenario]) -> Nominal:
+    """The nominal knowledge that goes with scenarios.
+
+    Raises:
+        ValueError: If they do not agree in it.
+    """
+    nominal, *others = {nominal_of(robot, scenario) for scenario in scenarios}
+    require(not others, "scenarios", f"{len(others) + 1} kinds", "one nominal knowledge for all")
+    return nominal
+
+
+@pydantic_dataclass(frozen=True, config=CONFIG)
+class _Kept:
+    """What a file of scores says."""
+
+    policy: str
+    per_episode: dict[str, list[Number]]
+    failed: list[Switch]
+
+
+_KEPT = TypeAdapter(_Kept)
+
+
+def score_all(
+    tasks: Sequence[Task],
+    workers: int = 1,
+    cache: Path | None = None,
+    progress: Callable[[int], object] = lambda episodes: None,
+) -> list[Evaluation | Refusal]:
+    """Score every task.
+
+    Args:
+        tasks: The tasks.
+        workers: Number of processes; without effect on the result.
+        cache: Folder in which the scores of a task are looked for, and kept when it is done; there
+            are none of refused policies, nor of those whose code is not known. A file that is
+            damaged is written anew, after a warning.
+        progress: Called with the number of episodes done since the last call.
+
+    Returns:
+        Scores or the reason why there are none, in the order of the tasks.
+    """
+    require(workers >= 1, "workers", workers, "1 or more")
+    outcomes: dict[int, Evaluation | Refusal] = {}
+    batches: list[tuple[Task, int, int]] = []
+    waiting: dict[int, dict[int, Evaluation | Refusal]] = {}
+    places = []
+    for index, task in enumerate(tasks):
+        known = _read(cache, task)
+        if known is not None:
+            outcomes[index] = known
+            progress(len(task.scenarios))
+            continue
+        waiting[index] = {}
+        for first in range(0, len(task.scenarios), BATCH):
+            batches.append((task, first, first + BATCH))
+            places.append(index)
+    for number, outcome in parallel.results(score_batch, batches, workers):
+        task, first, last = batches[number]
+        index = places[number]
+        parts = waiting[index]
+        parts[first] = outcome
+        progress(len(task.scenarios[first:last]))
+        if len(parts) == len(range(0, len(task.scenarios), BATCH)):
+            outcomes[index] = _whole([parts[first] for first in sorted(parts)])
+            _write(cache, task, outcomes[index])
+    return [outcomes[index] for index in range(len(tasks))]
+
+
+def score_batch(task: Task, first: int, last: int) -> Evaluation | Refusal:
+    """Score the episodes `first` to `last`, this one left out, of a task side by side."""
+    scenarios = task.scenarios[first:last]
+    try:
+        policy = task.contender.make(task.nominal)
+        if task.contender.identity is None:  # ours are never refused for a slow machine
+            policy = Timed(policy, task.time_limit)
+        return evaluate(policy, scenarios, robot=task.robot)
+    except (Exception, SystemExit) as error:  # whatever a controller may do
+        kind = "" if isinstance(error, ValueError | TimeoutError) else f"{type(error).__name__}: "
+        return Refusal(kind + in_one_line(error))
+
+
+class Timed:
+    """A policy that has to answer within a time.
+
+    Attributes:
+        nominal: Nominal knowledge of the policy, if it keeps one.
+        privileged: Whether it has to be given true state.
+    """
+
+    def __init__(self, policy: Policy, limit: float) -> None:
+        """Allow a policy `limit` seconds in all."""
+        self.nominal = getattr(policy, "nominal", None)
+        self.privileged = getattr(policy, "privileged", False)
+        self._policy = policy
+        self._limit = self._left = limit
+
+    def predict(self, *arguments: Any, **options: Any) -> Any:
+        """Let the policy answer.
+
+        Raises:
+            TimeoutError: If it has used up its time.
+        """
+        begin = time.perf_counter()
+        with alarm(self._left, self._expire):
+            answer = self._policy.predict(*arguments, **options)
+        self._left -= time.perf_counter() - begin
+        if self._left <= 0:
+            self._expire()
+        return answer
+
+    def _expire(self) -> NoReturn:
+        raise TimeoutError(f"thinks for more than {self._limit:g} s in a batch of episodes")
+
+
+@contextmanager
+def alarm(seconds: float, expire: Callable[[], NoReturn]) -> Iterator[None]:
+    """Interrupt what takes longer, where the system and the thread allow it."""
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
+        yield
+        return
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        expire()
+
+    previous = signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, previous)
+
+
+def _whole(parts: Sequence[Evaluation | Refusal]) -> Evaluation | Refusal:
+    scores = []
+    for part in parts:
+        if isinstance(part, Refusal):
+            return part
+        scores.append(part)
+    return joined(scores)
+
+
+def _read(cache: Path | None, task: Task) -> Evaluation | None:
+    """The scores of a task that are kept; none, and a warning, if they are not what was written."""
+    if cache is None or task.key is None or not (file := cache / f"{task.key}.json").exists():
+        return None
+    try:
+        kept = _KEPT.validate_python(read_json(file))
+        names, episodes = list(kept.per_episode), len(task.scenarios)
+        require(names == list(METRICS), "per_episode", names, ", ".join(METRICS))
+        lengths = {len(kept.failed), *map(len, kept.per_episode.values())}
+        require(lengths == {episodes}, "number of episodes", sorted(lengths), str(episodes))
+    except (ValueError, OSError) as error:
+        reason = f"{file} is damaged, and the scores are computed again: {in_one_line(error)}"
+        warnings.warn(reason, stacklevel=3)
+        return None
+    scores = {name: np.array(values) for name, values in kept.per_episode.items()}
+    return Evaluation(scores, np.array(kept.failed))
+
+
+def _write(cache: Path | None, task: Task, outcome: Evaluation | Refusal) -> None:
+    if cache is None or task.key is None or isinstance(outcome, Refusal):
+        return
+    cache.mkdir(parents=True, exist_ok=True)
+    scores = {name: values.tolist() for name, values in outcome.per_episode.items()}
+    data = {"policy": task.contender.name, "per_episode": scores, "failed": outcome.failed.tolist()}
+    write_json(cache / f"{task.key}.json", data)

@@ -1,0 +1,1 @@
+"""Observers, filters and predictions that control laws stand on."""

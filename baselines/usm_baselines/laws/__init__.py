@@ -1,0 +1,1 @@
+"""Control laws, one in a file."""

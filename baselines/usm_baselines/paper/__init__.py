@@ -1,0 +1,1 @@
+"""The paper's results: its laws at its own step, Table 1, figures, Theorem 1."""

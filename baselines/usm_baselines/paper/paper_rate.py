@@ -1,0 +1,249 @@
+"""Plant and laws in one compiled loop, for control periods down to the paper's step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_baselines.estimation.observer import observe, observer_gains
+from usm_baselines.laws.pd import PDGains, pd_force
+from usm_baselines.laws.super_twisting import SuperTwistingGains, super_twisting_force
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.lanes import WIDTH, block_at, spread
+from usm_gym.plant.chain import kinematics
+from usm_gym.plant.layout import *
+from usm_gym.plant.motion import line_of_sight, path
+from usm_gym.plant.step import move_water, physics_step
+from usm_gym.plant.thrusters import allocate, allocation_matrix
+from usm_gym.robot import Robot
+from usm_gym.simulation import Simulation
+from usm_gym.support.validation import require
+from usm_gym.task.metrics import LOST_ERROR
+from usm_gym.task.scenario import Scenario
+
+Array = NDArray[np.float64]
+SUPER_TWISTING = -1
+
+
+class Law(NamedTuple):
+    """A control law at the paper's step.
+
+    Attributes:
+        reading: `SUPER_TWISTING`, or a reading of the PD controller as an index of `pd.READINGS`.
+        measured: Whether the velocity is measured and no observer needed, the paper's first case:
+            the sliding variable is then (9).
+        implicit: Whether observer and super-twisting law are discretised implicitly.
+        super_twisting: Gains of the super-twisting controller.
+        pd: Gains of the PD controller.
+        start: Estimate of the velocity at the start, p2(0), m/s, (2,).
+    """
+
+    reading: int = SUPER_TWISTING
+    measured: bool = False
+    implicit: bool = False
+    super_twisting: SuperTwistingGains = SuperTwistingGains(heading_gain=125.0)
+    pd: PDGains = PDGains(heading_gain=125.0)
+    start: tuple[float, float] = (0.0, 0.0)
+
+
+class Record(NamedTuple):
+    """What a run leaves, at every `every`-th physics step from the first on, (samples, ...).
+
+    Attributes:
+        time: Times, s, (samples,).
+        reference: Reference of the centre of mass, m, (samples, 2).
+        error: Position errors, m, (samples, 2).
+        force: Force on the centre of mass, N, (samples, 2).
+        sigma: Sliding variable, m/s, (samples, 2).
+        observer_error: e1 = p - p1, m, (samples, 2).
+        disturbance: Acceleration less that by the force, f(t) / m_t of (23), m/s^2, (samples, 2).
+        effort: Mean absolute command of the thrusters, N, (samples,).
+        theta: Link angles, rad, (samples, links).
+    """
+
+    time: Array
+    reference: Array
+    error: Array
+    force: Array
+    sigma: Array
+    observer_error: Array
+    disturbance: Array
+    effort: Array
+    theta: Array
+
+
+def record_for(samples: int, links: int) -> Record:
+    """An empty record."""
+    pairs = np.empty((6, samples, 2))
+    return Record(
+        time=np.empty(samples),
+        reference=pairs[0],
+        error=pairs[1],
+        force=pairs[2],
+        sigma=pairs[3],
+        observer_error=pairs[4],
+        disturbance=pairs[5],
+        effort=np.empty(samples),
+        theta=np.empty((samples, links)),
+    )
+
+
+def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None = None) -> Record:
+    """Run a law on a scenario.
+
+    Args:
+        scenario: The scenario.
+        law: The control law.
+        every: Record every so many physics steps.
+        robot: The robot; without one, the paper's.
+
+    Raises:
+        ValueError: If the robot is lost.
+    """
+    conditions = scenario.conditions
+    body = robot or Robot()
+    # Of this simulation only the start is used: it need not hold the noise of a whole episode.
+    simulation = Simulation(body, [replace(scenario, duration=conditions.control_period)])
+    noise = scenario.noise() if conditions.position_noise else np.zeros((1, 2))
+    record = record_for(scenario.steps * conditions.substeps // every, body.links)
+    blocks, plant = simulation.fleet.blocks, simulation.plant
+    closed_loop(blocks, plant, body.total_mass, law, noise, every, record)
+    require(
+        np.abs(record.error).max() <= LOST_ERROR,
+        "control_period",
+        conditions.control_period,
+        "a period at which the robot is not lost",
+    )
+    return record
+
+
+@piece
+def law_force(law, k, started, error, speed, rate, acceleration, start, force, h, mass, state):
+    """One step of observer and law in one axis: the force on the centre of mass, N.
+
+    Arguments in the axis: measured position error (m) and speed (m/s), the reference's rate (m/s)
+    and acceleration (m/s^2), p2(0) (m/s), the force of the last step (N).
+    """
+    if law.measured:
+        z1, z2 = 0.0, 0.0
+        state[0], state[1] = error, speed - rate
+    else:
+        u = force / mass - acceleration
+        z1, z2 = observe(law.implicit, started, error, u, rate - start, h, k, state)
+    if law.reading == SUPER_TWISTING:
+        gains = law.super_twisting
+        return super_twisting_force(z1, z2, acceleration, h, mass, gains, law.implicit, state)
+    return pd_force(z1, z2, acceleration, mass, law.pd, law.reading, state)
+
+
+@piece
+def saturate(T, limit, commands, f_x, f_y):
+    """Cut thruster commands (N) at the limit; the forces (N) that they then make."""
+    beyond = False
+    for j in range(commands.size):
+        beyond |= abs(commands[j]) > limit
+    if beyond:
+        f_x, f_y = 0.0, 0.0
+        for j in range(commands.size):
+            commands[j] = min(max(commands[j], -limit), limit)
+            f_x += T[0, j] * commands[j]
+            f_y += T[1, j] * commands[j]
+    return f_x, f_y
+
+
+@compiled
+def closed_loop(blocks, plant, mass, law, noise, every, record):
+    """Plant, observer, control law and allocation, step by step; fills in the record.
+
+    `noise` (m) has a row for each control instant; when it ends, its last row stays.
+    """
+    links, h, substeps = plant.links, plant.h, plant.substeps
+    period = substeps * h
+    block, wide = block_at(blocks, 0, 0.0), spread(0.0)
+    row = blocks[0]
+    sine = row[row_of(SIN, links) : row_of(SIN, links) + links]
+    cosine = row[row_of(COS, links) : row_of(COS, links) + links]
+    theta = row[row_of(THETA, links) : row_of(THETA, links) + links]
+    thrusters = plant.thruster_links.size
+    commands = row[first_command(links) : first_command(links) + thrusters]
+    T = np.empty((3, thrusters))
+    sta = law.reading == SUPER_TWISTING
+    gains = law.super_twisting
+    k_sta = observer_gains(gains.observer_gain, gains.k2_exponent)
+    k_pd = observer_gains(law.pd.observer_gain, law.pd.k2_exponent)
+    k = k_sta if sta else k_pd
+    heading_gain = gains.heading_gain if sta else law.pd.heading_gain
+    surface = gains.surface if sta else law.pd.surface
+    state_x, state_y = np.zeros(6), np.zeros(6)
+    state_x[5] = state_y[5] = gains.alpha_start
+    start_x, start_y = law.start
+    f_x, f_y = 0.0, 0.0
+    for step in range(record.time.size * every):
+        t = step * h
+        p_x, p_y, v_x, v_y, a_x, a_y = path(t, row[SPEED], row[SWAY], row[FREQUENCY], row[RAMP])
+        e_x, e_y = row[P_X] - p_x, row[P_Y] - p_y
+        if plant.moving_water:
+            move_water(block, 0.0, h)
+        base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
+        if step % substeps == 0:
+            instant = step // substeps
+            started = float(instant)
+            noise_x, noise_y = noise[min(instant, noise.shape[0] - 1)]
+            f_x = law_force(
+                law,
+                k,
+                started,
+                e_x + noise_x,
+                row[V_X],
+                v_x,
+                a_x,
+                start_x,
+                f_x,
+                period,
+                mass,
+                state_x,
+            )
+            f_y = law_force(
+                law,
+                k,
+                started,
+                e_y + noise_y,
+                row[V_Y],
+                v_y,
+                a_y,
+                start_y,
+                f_y,
+                period,
+                mass,
+                state_y,
+            )
+            heading = 0.0
+            for i in range(links):
+                heading += theta[i]
+            heading = heading / links if row[HEAD_HEADING] == 0.0 else theta[links - 1]
+            distance = row[P_Y] + noise_y - (p_y if row[CROSS_TRACK] > 0.0 else 0.0)
+            moment = -heading_gain * (heading - line_of_sight(distance, row[LOOK_AHEAD]))
+            allocation_matrix(
+                sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T
+            )
+            allocate(T, f_x, f_y, moment, commands)
+            f_x, f_y = saturate(T, row[LIMIT], commands, f_x, f_y)
+        if step % every == 0:
+            n = step // every
+            record.time[n] = t
+            record.reference[n, 0], record.reference[n, 1] = p_x, p_y
+            record.error[n, 0], record.error[n, 1] = e_x, e_y
+            record.force[n, 0], record.force[n, 1] = f_x, f_y
+            record.effort[n] = np.abs(commands).mean()
+            record.theta[n] = theta
+            record.sigma[n, 0] = surface * state_x[0] + state_x[1]
+            record.sigma[n, 1] = surface * state_y[0] + state_y[1]
+            record.observer_error[n, 0] = e_x - state_x[0]
+            record.observer_error[n, 1] = e_y - state_y[0]
+        physics_step(block, 0.0, wide, WIDTH, plant, base)
+        if step % every == 0:
+            record.disturbance[step // every, 0] = row[A_X] - f_x / mass
+            record.disturbance[step // every, 1] = row[A_Y] - f_y / mass

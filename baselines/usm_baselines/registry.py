@@ -1,0 +1,211 @@
+"""Policies by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from usm_baselines.gains import TUNED, GainsFile, read_gains
+from usm_baselines.laws.generalised_super_twisting import (
+    ADAPTIVE_SPACE,
+    GENERALISED_SPACE,
+    AdaptiveGeneralisedSuperTwisting,
+    GeneralisedSuperTwisting,
+)
+from usm_baselines.laws.ladrc import LADRC, LADRC_SPACE
+from usm_baselines.laws.lqg import JOINT_LQG_SPACE, LQG, LQG_SPACE, JointLQG
+from usm_baselines.laws.mpc import MPC, MPC_SPACE
+from usm_baselines.laws.oracle import Oracle
+from usm_baselines.laws.pd import PD, PD_SPACES
+from usm_baselines.laws.pid import PID, PID_SPACE
+from usm_baselines.laws.sliding_mode import SLIDING_MODE_SPACE, SlidingMode
+from usm_baselines.laws.super_twisting import SUPER_TWISTING_SPACE, SuperTwisting
+from usm_baselines.laws.zero import Zero
+from usm_baselines.space import Space
+from usm_gym.policy import Policy
+from usm_gym.support.validation import require
+from usm_gym.task.nominal import Nominal
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A registered policy.
+
+    Attributes:
+        factory: Makes the policy from nominal knowledge; keyword arguments are its gains.
+        summary: What it is, in a line.
+        space: The gains that are tuned, by name, and where.
+        slow: Whether to leave it out of evaluations unless it is asked for.
+        privileged: Whether it is given true state, and so is no competitor.
+    """
+
+    factory: Callable[..., Policy]
+    summary: str
+    space: Space = field(default_factory=dict)
+    slow: bool = False
+    privileged: bool = False
+
+
+_entries: dict[str, Entry] = {}
+
+
+def register(
+    id: str,
+    factory: Callable[..., Policy],
+    summary: str,
+    *,
+    space: Space | None = None,
+    slow: bool = False,
+    privileged: bool = False,
+) -> None:
+    """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
+
+    Args:
+        id: Its name.
+        factory: `factory(nominal, **gains)` returns an object with `predict`; it is given
+            `env.unwrapped.nominal` and no more of the environment.
+        summary: What it is, in a line.
+        space: The gains that are tuned, by name, and where; without it, none are.
+        slow: Whether to leave it out of evaluations unless it is asked for.
+        privileged: Whether it is given true state.
+
+    Raises:
+        ValueError: If the name is taken.
+    """
+    require(id not in _entries, "id", id, "a name that is not taken")
+    _entries[id] = Entry(factory, summary, space or {}, slow, privileged)
+    shipped = TUNED / f"{id}.json"
+    if shipped.is_file():
+        _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
+
+
+def tuned(file: GainsFile) -> Entry:
+    """The registered policy that a file of gains is for, with these gains.
+
+    Raises:
+        ValueError: If there is no such policy.
+    """
+    base, budget = entry(file.policy), file.budget
+    return Entry(
+        partial(base.factory, **file.gains),
+        f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
+        slow=base.slow,
+        privileged=base.privileged,
+    )
+
+
+def ids() -> list[str]:
+    """Names of all registered policies, in the order of registration."""
+    return list(_entries)
+
+
+def entry(id: str) -> Entry:
+    """The registered policy of a name.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    require(id in _entries, "policy", id, ", ".join(_entries))
+    return _entries[id]
+
+
+def make(id: str, env: Any, **gains: Any) -> Policy:
+    """Make a policy for an environment.
+
+    Args:
+        id: Name of the policy.
+        env: Environment, single or vector, or the `Nominal` knowledge itself.
+        gains: Gains other than the defaults, by name.
+
+    Raises:
+        ValueError: If the policy or a gain is unknown, or the environment is none of this package.
+    """
+    policy = entry(id)
+    try:
+        return policy.factory(nominal_knowledge(env), **gains)
+    except TypeError as error:
+        require(not gains, "gains", gains, f"those of the policy ({error})")
+        raise
+
+
+def nominal_knowledge(env: Any) -> Nominal:
+    """The nominal knowledge of an environment, whatever it is wrapped in."""
+    if isinstance(env, Nominal):
+        return env
+    inner = getattr(env, "unwrapped", env)
+    if hasattr(inner, "nominal"):
+        nominal = inner.nominal
+    else:
+        require(hasattr(inner, "get_attr"), "env", env, "an environment of this package")
+        nominal = inner.get_attr("nominal")[0]
+    require(isinstance(nominal, Nominal), "env", env, "an environment of this package")
+    known: Nominal = nominal
+    return known
+
+
+register(
+    "sta",
+    SuperTwisting,
+    "adaptive super-twisting (10)-(20), the paper's gains, implicit",
+    space=SUPER_TWISTING_SPACE,
+)
+register(
+    "sta-explicit",
+    partial(SuperTwisting, implicit=False),
+    "the same by Euler's forward method, as the paper has it",
+)
+register("pd", PD, "PD (21) as a force, the paper's gains", space=PD_SPACES["force"])
+register(
+    "pd-mass",
+    partial(PD, reading="mass"),
+    "PD (21) times the mass, with feedforward",
+    space=PD_SPACES["mass"],
+)
+register(
+    "pd-observer",
+    partial(PD, reading="observer"),
+    "PD (21) in the place of u_STA in (19), the paper's words to the letter",
+    space=PD_SPACES["observer"],
+)
+register("pid", PID, "PID, filtered derivative, anti-windup", space=PID_SPACE)
+register(
+    "ladrc",
+    LADRC,
+    "linear active-disturbance rejection: extended-state observer and pole placement",
+    space=LADRC_SPACE,
+)
+register(
+    "lqg",
+    LQG,
+    "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
+    space=LQG_SPACE,
+)
+register(
+    "lqg-joints",
+    JointLQG,
+    "the same with the joint motion foreseen by the nominal plant",
+    space=JOINT_LQG_SPACE,
+)
+register("mpc", MPC, "predictive control on the nominal plant, joint motion known", space=MPC_SPACE)
+register(
+    "smc",
+    SlidingMode,
+    "sliding mode with boundary layer and integral action",
+    space=SLIDING_MODE_SPACE,
+)
+register(
+    "gsta",
+    GeneralisedSuperTwisting,
+    "generalised super-twisting on the paper's observer",
+    space=GENERALISED_SPACE,
+)
+register(
+    "agsta",
+    AdaptiveGeneralisedSuperTwisting,
+    "the same with the paper's adaptation of its gains",
+    space=ADAPTIVE_SPACE,
+)
+register("oracle", Oracle, "the limit: true state, exact plant, the future", privileged=True)
+register("zero", Zero, "no thrust")

@@ -1,0 +1,23 @@
+"""Short episodes, for tests of what does not depend on their length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from usm_gym.support.seeding import EVALUATION, stream
+from usm_gym.task.conditions import FIELD
+from usm_gym.task.scenario import Scenario, sample
+
+
+def short(count: int, duration: float = 1.0, seed: int = 0) -> list[Scenario]:
+    """Return drawn operation scenarios that are soon over; in the second half the joints move."""
+    scenarios = [sample("operation", FIELD, stream(seed, EVALUATION, i)) for i in range(count)]
+    return [
+        replace(
+            each,
+            inspection=replace(each.inspection, times=(duration / 2,), deflections=(0.8,)),
+            duration=duration,
+            settle_time=0.2 * duration,
+        )
+        for each in scenarios
+    ]

@@ -1,0 +1,45 @@
+"""Shipped agents: policies like the scripted ones, and as good as their files say."""
+
+import subprocess
+import sys
+
+import pytest
+from agents.artifact import DESCRIPTION, PRETRAINED, read_agent
+from agents.selection import unseen
+from baselines.leaderboard import total
+from usm_gym.conditions import Conditions
+from usm_gym.nominal import nominal_of
+
+import agents  # noqa: F401 (registers them)
+import baselines
+import usm_gym
+from usm_gym.robot import Robot
+
+SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
+
+
+@pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
+def test_a_shipped_agent_beats_its_base_as_it_says(folder):
+    assert folder.name in baselines.ids()
+    agent, _ = read_agent(folder)
+    scenarios = unseen(agent.mode, Conditions(**agent.conditions), seed=11, episodes=16)
+    nominal = nominal_of(Robot(), scenarios[0])
+    ours, base = (
+        usm_gym.evaluate(baselines.make(id, nominal), scenarios) for id in (folder.name, agent.base)
+    )
+    assert not ours.failed.any()
+    assert total(ours).mean() < total(base).mean()
+    for axis in "xy":
+        name = f"max_error_{axis}"
+        assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]
+
+
+def test_scoring_a_shipped_agent_does_not_import_torch():
+    code = """
+import sys, agents, baselines, usm_gym
+from usm_gym.nominal import nominal_of
+suite = usm_gym.suite("operation")[:1]
+usm_gym.evaluate(baselines.make("residual-ppo", nominal_of(usm_gym.Robot(), suite[0])), suite)
+sys.exit("torch" in sys.modules)
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

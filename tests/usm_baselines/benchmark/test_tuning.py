@@ -1,0 +1,233 @@
+"""Gains are tuned on training scenarios only, the same however the work is done."""
+
+import contextlib
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("optuna", reason="the extra `tune` is not installed")
+
+import optuna
+import sqlalchemy
+from usm_baselines import registry
+from usm_baselines.benchmark import tuning
+from usm_baselines.benchmark.tuning import Problem, objective, tune
+from usm_baselines.gains import Budget
+from usm_baselines.space import Range
+
+from usm_gym import suites
+from usm_gym.evaluation import METRICS, Evaluation
+from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION
+from usm_gym.task.conditions import FIELD
+from usm_gym.task.scenario import STILL
+
+SPACE = {
+    "observer_gain": Range(0.1, 100.0, "m/s^3"),
+    "surface": Range(0.1, 10.0, "1/s"),
+    "alpha_start": Range(0.0, 1.0, "m^0.5/s^1.5", log=False),
+}
+PROBLEM_BUDGET = Budget(trials=20, episodes=3)
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Declare a space for the STA, and tune on episodes of a second, one of which is the first."""
+    entries = dict(registry._entries)
+    entries["sta"] = replace(entries["sta"], space=SPACE)
+    monkeypatch.setattr(registry, "_entries", entries)
+    monkeypatch.setattr(tuning, "FIRST_EPISODES", 1)
+    sample = tuning.sample
+
+    def brief(*arguments: Any) -> Any:
+        return replace(sample(*arguments), duration=1.0, settle_time=0.2, inspection=STILL)
+
+    monkeypatch.setattr(tuning, "sample", brief)
+
+
+def problem(**changes: Any) -> Problem:
+    return Problem(**{"policy": "sta", "budget": PROBLEM_BUDGET, **changes})
+
+
+def test_the_objective_is_the_declared_one() -> None:
+    scores = {name: np.full(2, 1.0) for name in METRICS}
+    scores["max_error_x"] = np.array([1e-3, 3e-3])
+    scores["max_error_y"] = np.array([2e-3, 4e-3])
+    scores["thrust_variation"] = np.array([100.0, 300.0])
+    evaluation = Evaluation(scores, np.zeros(2, bool))
+    assert objective(evaluation) == pytest.approx(5.0 + 0.002 * 200.0)
+    assert objective(evaluation, weight=0.0) == pytest.approx(5.0)
+
+
+def test_tuning_improves_and_gives_up_what_is_no_good() -> None:
+    seen: list[tuple[int, float]] = []
+    result = tune(problem(), progress=lambda trials, best: seen.append((trials, best)))
+    assert seen[-1] == (20, result.objective)
+    bests = [best for _, best in seen[1:]]
+    assert bests == sorted(bests, reverse=True)
+    assert result.validation < result.start
+    assert set(result.gains) == set(SPACE)
+    assert all(each.low <= result.gains[name] <= each.high for name, each in SPACE.items())
+
+
+def test_the_result_is_the_same_for_any_workers_and_after_an_interruption(tmp_path: Path) -> None:
+    whole = tune(problem())
+    assert tune(problem(), workers=2) == whole
+    storage = f"sqlite:///{tmp_path / 'trials.db'}"
+
+    def interrupt(trials: int, best: float) -> None:
+        if trials == 16:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        tune(problem(), storage, progress=interrupt)
+    left = optuna.load_study(study_name=problem().study, storage=storage)
+    left.ask()  # a trial during which the process was killed
+    assert tune(problem(), storage) == whole
+    assert tune(problem(seed=1)) != whole
+
+
+def test_another_problem_never_continues_a_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = problem()
+    others = [
+        problem(seed=1),
+        problem(weight=0.01),
+        problem(mode="torpedo"),
+        problem(conditions=replace(FIELD, position_noise=0.0)),
+        problem(budget=Budget(20, 4)),
+    ]
+    assert len({each.study for each in (one, *others)}) == 6
+    assert problem(budget=Budget(40, 3)).study == one.study  # more trials go on with the others
+    before, wider = one.study, {**SPACE, "surface": Range(0.1, 20.0, "1/s")}
+    monkeypatch.setitem(registry._entries, "sta", replace(registry.entry("sta"), space=wider))
+    assert problem().study != before
+
+
+def test_tuning_cannot_reach_a_frozen_suite() -> None:
+    # By imports: not even indirectly. By draws: no scenario, no noise seed in common.
+    code = (
+        "import grimp; graph = grimp.build_graph('usm_agents', 'usm_baselines', 'usm_gym');"
+        "found = {m for m in graph.find_upstream_modules('usm_baselines.benchmark.tuning')"
+        " | graph.find_upstream_modules('usm_cli.commands.tune') if 'suites' in m};"
+        "print(sorted(found))"
+    )
+    answer = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert answer.strip() == "[]"
+    frozen = {each.noise_seed for name in suites.NAMES for each in suites.suite(name)}
+    for seed in range(20):
+        for purpose in (TUNING, VALIDATION):
+            drawn = {each.noise_seed for each in problem(seed=seed).scenarios(purpose)}
+            assert not drawn & frozen
+    with pytest.raises(ValueError, match="purpose"):
+        problem().scenarios(EVALUATION)
+
+
+def test_no_two_purposes_share_a_stream() -> None:
+    purposes = (SUITE, EVALUATION, TRAINING, TUNING, VALIDATION)
+    assert len(set(purposes)) == 5
+    drawn = {purpose: problem() for purpose in (TUNING, VALIDATION)}
+    seeds = [each.noise_seed for purpose, p in drawn.items() for each in p.scenarios(purpose)]
+    assert len(set(seeds)) == 6
+
+
+def test_a_policy_that_never_acts_is_said_to() -> None:
+    def broken(nominal: Any, **gains: float) -> Any:
+        raise RuntimeError("no motor") if gains else ValueError("no motor")
+
+    registry.register("broken", broken, "broken", space={"gain": Range(1.0, 2.0, "1")})
+    with pytest.raises(ValueError, match="no motor"):
+        tune(problem(policy="broken", budget=Budget(2, 1)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"policy": "zero"}, "zero"),
+        ({"policy": "nobody"}, "nobody"),
+        ({"budget": Budget(0, 3)}, "trials"),
+        ({"budget": Budget(3, 0)}, "episodes"),
+        ({"weight": -1.0}, "weight"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changes: dict[str, Any], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        problem(**changes)
+
+
+def test_a_storage_that_cannot_be_used_gets_one_line() -> None:
+    with pytest.raises(ValueError, match="storage nonsense"):
+        tune(problem(), "nonsense")
+
+
+@pytest.mark.parametrize(
+    ("method", "number"),
+    [("ask", 3), ("set_user_attr", 0), ("set_user_attr", 5), *(("tell", n) for n in (0, 3, 7, 19))],
+)
+def test_a_round_that_was_killed_counts_as_a_whole_or_not_at_all(
+    method: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner: Any = optuna.Trial if method == "set_user_attr" else optuna.Study
+    original, count = getattr(owner, method), 0
+
+    def killed(*arguments: Any, **options: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count > number:
+            raise KeyboardInterrupt
+        return original(*arguments, **options)
+
+    storage = f"sqlite:///{tmp_path / 'trials.db'}"
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, method, killed)
+        with pytest.raises(KeyboardInterrupt):
+            tune(problem(), storage)
+    assert tune(problem(), storage) == tune(problem())
+
+
+def test_a_study_in_a_file_belongs_to_one_process_at_a_time(tmp_path: Path) -> None:
+    storage = f"sqlite:///{tmp_path / 'trials.db'}"
+    brief, refused = problem(budget=Budget(8, 1)), []
+
+    def meanwhile(trials: int, best: float) -> None:
+        if trials == 0:
+            with pytest.raises(BlockingIOError, match="in use by another command") as caught:
+                tune(brief, storage)
+            refused.append(caught.value)
+            tune(problem(budget=Budget(1, 1), seed=1), storage)  # another study in the same file
+
+    assert tune(brief, storage, progress=meanwhile) == tune(brief)
+    assert len(refused) == 1
+
+
+def test_a_disk_that_fills_up_gets_one_line(tmp_path: Path) -> None:
+    def fill(connection: Any, *_: Any) -> None:
+        connection.execute("PRAGMA max_page_count = 1")  # no more than there are
+
+    engine, storage = sqlalchemy.engine.Engine, f"sqlite:///{tmp_path / 'trials.db'}"
+    tune(problem(budget=Budget(1, 1)), storage)
+    sqlalchemy.event.listen(engine, "checkout", fill)
+    try:
+        with pytest.raises(ValueError, match=r"trials\.db cannot be used: database .* full$"):
+            tune(problem(budget=Budget(60, 1)), storage)
+    finally:
+        sqlalchemy.event.remove(engine, "checkout", fill)
+    assert tune(problem(budget=Budget(2, 1)), storage)
+
+
+def test_a_locked_database_gets_one_line(tmp_path: Path) -> None:
+    with contextlib.closing(sqlite3.connect(tmp_path / "trials.db")) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        with pytest.raises(ValueError, match=r"cannot be used: database is locked$"):
+            tune(problem(), f"sqlite:///{tmp_path / 'trials.db'}?timeout=0")
+
+
+def test_a_password_is_not_said() -> None:
+    with pytest.raises(ValueError, match="storage") as caught:
+        tune(problem(), "nonsense://me:secret@host/trials")
+    assert "secret" not in str(caught.value)

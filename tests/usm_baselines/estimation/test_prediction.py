@@ -1,0 +1,100 @@
+"""With the nominal plant for a plant, the predictor foresees it; in `mpc` that is worth a lot."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+import usm_baselines
+from usm_baselines.estimation import kalman
+from usm_baselines.estimation.prediction import Predictor
+from usm_baselines.laws.mpc import forced_response, receding_gain
+from usm_baselines.signals import Signals, model_of
+
+from usm_gym import Robot, Scenario, evaluate
+from usm_gym.simulation import Simulation
+from usm_gym.task.conditions import PRESETS
+from usm_gym.task.nominal import nominal_of
+from usm_gym.task.scenario import named
+
+ROBOT = Robot()
+# Nothing unknown but the start: nominal water at rest, no noise, thrusters with their lag.
+KNOWN = dataclasses.replace(PRESETS["ideal"], thruster_time_constant=0.05, thruster_limit=20.0)
+
+
+def scenario(**changes: Any) -> Scenario:
+    known = named("nominal", "operation", KNOWN)
+    motion = dataclasses.replace(known.inspection, times=(1.0, 2.0, 9.0), filter_frequency=9.0)
+    return dataclasses.replace(known, inspection=motion, duration=4.0, settle_time=0.5, **changes)
+
+
+def signals(simulation: Simulation, started: bool) -> Signals:
+    """Return what a predictor looks at."""
+    nothing = np.zeros((1, 2))
+    return Signals(
+        started=np.array([float(started)]),
+        y=nothing,
+        u=nothing,
+        velocity=nothing,
+        acceleration=nothing,
+        allocation=np.zeros((1, 3, 5)),
+        observation=simulation.observation.copy(),
+    )
+
+
+def test_the_nominal_plant_is_foreseen() -> None:
+    """Commands that are held, joints in full motion: where it goes and where it is said to go."""
+    nominal = nominal_of(ROBOT, scenario())
+    correction = kalman.linear_model(nominal, 1e-2, 0.1).correction
+    predictor = Predictor(nominal, model_of(nominal), correction)
+    state = np.zeros((1, predictor.size))
+    simulation = Simulation(ROBOT, [scenario()])
+    rng = np.random.default_rng(0)
+    action = np.zeros((1, 5), np.float32)
+    for k in range(86):
+        predictor.estimate(signals(simulation, k > 0), state)
+        if k < 80:
+            action = rng.uniform(-0.3, 0.3, (1, 5)).astype(np.float32)
+        if k < 85:
+            simulation.step(action)
+    start, path = simulation.error.copy(), []
+    ahead = predictor.foresee(signals(simulation, True), state, 5)
+    for _ in range(5):
+        simulation.step(action)
+        path.append(simulation.error.copy())
+    moved = np.array(path) - start
+    # 4 ms steps there, 1 ms steps here.
+    np.testing.assert_allclose(ahead[..., 0] - start, moved, atol=0.03 * np.abs(moved).max())
+    np.testing.assert_allclose(state[0, [0, 3]], start[0], atol=0.03 * np.abs(moved).max())
+    assert np.abs(moved).max() > 1e-4
+
+
+def test_the_forced_response_is_the_model_stepped() -> None:
+    T = kalman.sampled(0.4, 0.05, 0.02)
+    changes = np.random.default_rng(0).normal(size=6)
+    x, u, errors = np.zeros(4), 0.0, []
+    for change in changes:
+        u += change
+        x = T @ [*x, u, 0.0]
+        errors.append(x[0])
+    np.testing.assert_allclose(forced_response(T, 6) @ changes, errors, rtol=1e-12)
+
+
+def test_the_first_change_is_that_of_the_least_squares() -> None:
+    T = kalman.sampled(0.4, 0.05, 0.02)
+    free, weight = np.random.default_rng(1).normal(size=8), 1e-3
+    S = np.vstack([forced_response(T, 8), weight * np.eye(8)])
+    best, *_ = np.linalg.lstsq(S, np.append(-free, np.zeros(8)), rcond=None)
+    assert -receding_gain(T, 8, weight) @ free == pytest.approx(best[0], rel=1e-6)
+
+
+def test_joint_motion_that_is_foreseen_disturbs_little() -> None:
+    """Noise of the laws' filters as in field, so that their gains are the same."""
+    nominal = dataclasses.replace(nominal_of(ROBOT, scenario()), position_noise=5e-5)
+    worst = {}
+    for id in ("lqg", "lqg-joints", "mpc"):
+        gains = {"disturbance_noise": 0.1, "variation_weight": 5e-5}
+        scores = evaluate(usm_baselines.make(id, nominal, **gains), [scenario()]).per_episode
+        worst[id] = np.array([scores["max_error_x"][0], scores["max_error_y"][0]])
+    assert (worst["lqg-joints"] < 0.35 * worst["lqg"]).all()
+    assert (worst["mpc"] < 0.35 * worst["lqg"]).all()

@@ -1,0 +1,129 @@
+"""Names become policies, or one clear line."""
+
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.episodes import short
+from usm_baselines.contender import contender
+
+import usm_gym
+from usm_gym import Robot
+from usm_gym.task.nominal import nominal_of
+from usm_gym.task.scenario import named
+
+NOMINAL = nominal_of(Robot(), named("nominal", "operation"))
+PAGE = Path(__file__).parents[2] / "docs" / "own_controller.md"
+FAULTY = """
+class Plain:
+    def __init__(self, gain=2.0):
+        self.gain = gain
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return observation[:, :5], state
+class Knowing(Plain):
+    def __init__(self, gain=2.0, nominal=None):
+        self.nominal = nominal
+class Needy(Plain):
+    def __init__(self, knowledge):
+        self.nominal = knowledge
+def factory():
+    return Plain(7.0)
+class Mute: ...
+class Short(Plain):
+    def predict(self, observation): ...
+class Broken(Plain):
+    def __init__(self):
+        raise OSError("no\\nweights")
+"""
+
+
+@pytest.fixture
+def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    (tmp_path / "faulty.py").write_text(FAULTY)
+    (tmp_path / "wrong.py").write_text("import nothing_of_the_kind")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "faulty", raising=False)
+    return "faulty"
+
+
+def gains_file(folder: Path, policy: str = "sta", **gains: Any) -> Path:
+    path = folder / f"{policy}.json"
+    data = {"policy": policy, "gains": gains, "budget": {"trials": 3, "episodes": 2}, "weight": 0.1}
+    path.write_text(json.dumps(data))
+    return path
+
+
+def test_an_id_is_the_registered_policy_and_a_file_gives_it_gains(tmp_path: Path) -> None:
+    path = gains_file(tmp_path, surface=3.0)
+    plain: Any = contender("sta").make(NOMINAL)
+    given: Any = contender(f"sta@{path}").make(NOMINAL)
+    assert given.gains == plain.gains._replace(surface=3.0)
+
+
+def test_what_scores_depend_on_changes_with_the_gains_and_not_with_the_file(tmp_path: Path) -> None:
+    first = contender(f"sta@{gains_file(tmp_path, surface=3.0)}").identity
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    assert contender(f"sta@{gains_file(other, surface=3.0)}").identity == first
+    found = {first, contender("sta").identity, contender("sta-explicit").identity}
+    found.add(contender(f"sta@{gains_file(tmp_path, surface=4.0)}").identity)
+    assert len(found) == 4
+
+
+def test_a_controller_of_ones_own_is_given_the_nominal_knowledge_if_it_asks(mine: str) -> None:
+    def make(name: str) -> Any:
+        found = contender(f"{mine}:{name}")
+        assert found.identity is None  # its code may change at any time
+        return found.make(NOMINAL)
+
+    assert make("Plain").gain == 2.0
+    assert make("Knowing").nominal is NOMINAL
+    assert make("Needy").nominal is NOMINAL
+    assert make("factory").gain == 7.0
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("nobody", "nobody"),
+        ("absent:Plain", "No module named 'absent'"),
+        ("wrong:Plain", "No module named 'nothing_of_the_kind'"),
+        ("faulty:Plan", "'Plan'; allowed: a class or factory in faulty, which has Plain, Knowing"),
+        ("faulty:Mute", "predict(observation, state=None"),
+        ("faulty:Short", "too many positional arguments"),
+        ("faulty:Broken", "cannot be made: OSError: no weights"),
+        ("sta@pd.json", "policy of pd.json is 'pd'; allowed: sta"),
+        ("sta@wrong.json", "wrong.json is no file of gains"),
+        ("sta@odd.json", "odd.json is no file of gains"),
+        ("sta@sta.json", "stiffness"),
+    ],
+)
+def test_what_is_missing_is_said(mine: str, name: str, said: str) -> None:
+    gains_file(Path(), "pd")
+    gains_file(Path(), stiffness=3.0)
+    Path("wrong.json").write_text("{")
+    Path("odd.json").write_text('{"policy": "sta", "gains": {"surface": "high"}}')
+    with pytest.raises(ValueError, match=re.escape(said)):
+        contender(name).make(NOMINAL)
+
+
+def test_the_example_in_the_documentation_works_when_copied(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[0]
+    (tmp_path / "my_controller.py").write_text(code)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    policy = contender("my_controller:MyController").make(NOMINAL)
+    scenarios = short(4, duration=8.0)
+    errors = [
+        usm_gym.evaluate(each, scenarios).per_episode["max_error_x"]
+        for each in (policy, contender("zero").make(NOMINAL))
+    ]
+    assert np.mean(errors[0]) < 0.5 * np.mean(errors[1])
+    assert len(code.splitlines()) <= 40

@@ -1,0 +1,163 @@
+"""`usm bench`: speed, against peers, in one run."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import gymnasium as gym
+from rich.table import Table
+
+from usm_cli import speed as benchmark
+from usm_cli.speed import BATCH_PERIOD, ROBOTS, SINGLE_PERIOD, Figure, Task, summarise
+from usm_cli.terminal import empty_table, output_console, progress_bar
+from usm_gym.support.files import check_writable, write_json
+from usm_gym.support.provenance import provenance
+from usm_gym.support.text import figures
+from usm_gym.support.validation import require
+
+DESCRIPTION = """\
+Measure speed on this machine, each figure against its peer in the same run: the tasks take turns,
+round by round, and medians with smallest and largest value are printed. Peers that are not
+installed (the extra `bench`) are said to be missing. Takes two minutes; let the machine do nothing
+else meanwhile.
+"""
+
+PEERS = {
+    "plant_step_ratio_mujoco": ("mujoco_step_ns", "plant_step_ns"),
+    "batch_step_ratio_mujoco": ("mujoco_step_ns", "batch_step_ns"),
+    "vector_env_ratio_swimmer_v5": ("swimmer_v5_step_ns", "vector_env_step_ns"),
+    "vector_env_ratio_sync": ("sync_vector_env_step_ns", "vector_env_step_ns"),
+    "vector_env_ratio_cartpole": ("cartpole_vector_env_step_ns", "vector_env_step_ns"),
+    "second_thread_speedup": ("vector_env_step_ns", "vector_env_two_threads_step_ns"),
+}
+MEANINGS = {
+    "plant_step_ns": "physics step of one robot, ns",
+    "batch_step_ns": f"physics step, {ROBOTS} robots, one thread, per robot, ns",
+    "mujoco_step_ns": "MuJoCo, C loop, Euler, the same chain, ns",
+    "vector_env_step_ns": f"environment step, {ROBOTS} robots, one thread, per robot, ns",
+    "vector_env_two_threads_step_ns": "the same on two threads, ns",
+    "episode_start_us": "start of an episode in the vector environment, us",
+    "sync_vector_env_step_ns": "SyncVectorEnv of 8 of our environments, per robot, ns",
+    "swimmer_v5_step_ns": "Gymnasium's Swimmer-v5, ns",
+    "cartpole_vector_env_step_ns": f"Gymnasium's CartPole vector environment, {ROBOTS}, ns",
+    "plant_step_ratio_mujoco": "MuJoCo / physics step of one robot",
+    "batch_step_ratio_mujoco": "MuJoCo / physics step in a batch",
+    "vector_env_ratio_swimmer_v5": "Swimmer-v5 / environment step (20 physics steps)",
+    "vector_env_ratio_sync": "SyncVectorEnv / native vector environment",
+    "vector_env_ratio_cartpole": "CartPole vector environment / ours",
+    "second_thread_speedup": "one thread / two threads",
+    "paper_rate_40s_s": "40 s at 1e-5 s with observer and STA, s",
+    "evaluate_suite_s": "operation suite, six policies, s",
+    "thousand_episodes_s": "1000 operation episodes of 40 s with sta, s",
+    "cold_start_s": "start of Python to first step, warm kernel cache, s",
+    "compile_s": "the same with an empty cache, s",
+}
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "bench",
+        help="measure speed against peers",
+        description=DESCRIPTION,
+    )
+    parser.add_argument("--rounds", type=int, default=15, metavar="N", help="default: 15")
+    parser.add_argument("--growth", action="store_true", help="also links 4-64, robots 1-4096")
+    parser.add_argument("--output", metavar="FILE", help="write the figures as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure, print, write."""
+    rounds = arguments.rounds
+    require(1 <= rounds <= 10_000, "--rounds", rounds, "1 to 10000")
+    if arguments.output:
+        check_writable(arguments.output)
+    tasks, missing = available()
+    seconds = whole_jobs()
+    with progress_bar() as bar:
+        total = bar.add_task("rounds", total=rounds + len(seconds))
+        times = benchmark.interleaved(tasks, rounds, lambda: bar.advance(total))
+        for name, (job, repeats) in seconds.items():
+            bar.update(total, description=name)
+            times[name] = [job() for _ in range(repeats)]
+            bar.advance(total)
+    measured = {name: summarise(values) for name, values in times.items()}
+    for ratio, (slow, fast) in PEERS.items():
+        if slow in times:
+            pairs = zip(times[slow], times[fast], strict=True)
+            measured[ratio] = summarise([a / b for a, b in pairs])
+    console = output_console()
+    console.print(table(measured, missing))
+    rows = list(benchmark.growth(min(rounds, 5))) if arguments.growth else []
+    if rows:
+        console.print(growth_table(rows))
+    if arguments.output:
+        document = {
+            **{name: figure.median for name, figure in measured.items()},
+            "spread": {name: asdict(figure) for name, figure in measured.items()},
+            "missing": missing,
+            "growth": rows,
+            "machine": benchmark.machine(),
+            "provenance": provenance({"rounds": rounds}),
+        }
+        write_json(arguments.output, document)
+
+
+def available() -> tuple[list[Task], list[str]]:
+    """Tasks that can be run here, and the names of those that lack a package."""
+    makers: dict[str, Callable[[str], Task]] = {
+        "plant_step_ns": lambda name: benchmark.plant_task(name, 1, SINGLE_PERIOD),
+        "batch_step_ns": lambda name: benchmark.plant_task(name, ROBOTS, BATCH_PERIOD),
+        "mujoco_step_ns": lambda name: benchmark.mujoco_task(name, 2000),
+        "vector_env_step_ns": lambda name: benchmark.vector_task(name, ROBOTS, 100),
+        "vector_env_two_threads_step_ns": lambda name: benchmark.vector_task(name, ROBOTS, 100, 2),
+        "sync_vector_env_step_ns": lambda name: benchmark.sync_task(name, 8, 50),
+        "episode_start_us": lambda name: benchmark.start_task(name, 64),
+        "swimmer_v5_step_ns": lambda name: benchmark.swimmer_task(name, 500),
+        "cartpole_vector_env_step_ns": lambda name: benchmark.cartpole_task(name, ROBOTS, 200),
+    }
+    tasks, missing = [], []
+    for name, maker in makers.items():
+        try:
+            tasks.append(maker(name))
+        except (ImportError, gym.error.Error):
+            missing.append(name)
+    return tasks, missing
+
+
+def whole_jobs() -> dict[str, tuple[Callable[[], float], int]]:
+    """Jobs that are timed as a whole, and how often."""
+    benchmark.paper_rate()  # compiles what is not yet compiled
+    return {
+        "paper_rate_40s_s": (lambda: benchmark.timed(benchmark.paper_rate), 3),
+        "evaluate_suite_s": (lambda: benchmark.timed(benchmark.evaluate_suite), 3),
+        "thousand_episodes_s": (lambda: benchmark.timed(benchmark.thousand_episodes), 1),
+        "cold_start_s": (lambda: benchmark.first_step(compile_anew=False), 5),
+        "compile_s": (lambda: benchmark.first_step(compile_anew=True), 1),
+    }
+
+
+def table(measured: dict[str, Figure], missing: list[str]) -> Table:
+    """The figures for the terminal."""
+    rows = empty_table("figure", "what it is", numbers=("median", "smallest", "largest"))
+    for name, meaning in MEANINGS.items():
+        if name in measured:
+            figure = measured[name]
+            rows.add_row(name, meaning, *map(figures, (figure.median, figure.low, figure.high)))
+        elif name in missing:
+            rows.add_row(name, f"{meaning}: not installed (the extra bench)")
+    return rows
+
+
+def growth_table(rows: list[dict[str, float]]) -> Table:
+    """How the cost grows."""
+    headings = ("links", "robots", "threads", "ns per robot and step", "ns per link")
+    table = empty_table(numbers=headings)
+    for row in rows:
+        counts = [str(row[key]) for key in ("links", "robots", "threads")]
+        table.add_row(*counts, figures(row["ns"]), figures(row["ns"] / row["links"]))
+    return table

@@ -1,0 +1,94 @@
+"""`usm leaderboard`: every policy on every frozen suite."""
+
+from __future__ import annotations
+
+import argparse
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from rich.markdown import Markdown
+from usm_baselines.benchmark.leaderboard import MAIN, cells, document, everyone, front, suites
+from usm_baselines.benchmark.leaderboard_page import csv_text, markdown, table, with_table
+
+from usm_cli.options import output_folder
+from usm_cli.selection import (
+    POLICIES,
+    add_policies,
+    add_scoring,
+    chosen_contenders,
+    leave_if_refused,
+    scored,
+)
+from usm_cli.terminal import output_console
+from usm_gym.suites import NAMES
+from usm_gym.support.files import check_writable, holding, write_json, write_text
+from usm_gym.support.provenance import provenance
+from usm_gym.support.validation import require
+
+DESCRIPTION = """\
+Score every policy on every frozen suite, and on the operation suite with the joints still. Writes
+leaderboard.json, leaderboard.csv, leaderboard.md and three figures (extra `render`) into a folder.
+An interrupted run goes on where it stopped: each policy's scores on a suite are kept in the folder
+`cache` there, for as long as nothing that they depend on changes.
+"""
+EXAMPLES = f"""\
+{POLICIES}
+examples:
+  usm leaderboard --workers 2                          into results/VERSION
+  usm leaderboard --insert README.md                   and a short table between the marks there
+  usm leaderboard --policies sta,my_module:MyController --output mine
+"""
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "leaderboard",
+        help="score every policy on every suite",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
+    add_policies(parser, default="all, also slow and privileged ones")
+    add_scoring(parser)
+    add = parser.add_argument
+    add("--output", metavar="DIR", help="folder (default: results/VERSION)")
+    add(
+        "--insert",
+        metavar="FILE",
+        help="page in which to renew the short table of the operation suite",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Score, write the folder, print the main table."""
+    page = None if arguments.insert is None else Path(arguments.insert).read_text(encoding="utf-8")
+    if page is not None:
+        check_writable(arguments.insert)
+    folder = output_folder(arguments.output or f"results/{version('usm-gym')}")
+    from usm_baselines.benchmark.leaderboard_figures import draw_all
+
+    named = arguments.policies is not None
+    contenders = chosen_contenders(arguments.policies) if named else everyone()
+    fronts = {} if named else front()
+    chosen = cells(contenders, fronts, suites(), arguments.time_limit)
+    with holding(folder):
+        outcomes = scored([cell.task for cell in chosen], arguments, folder / "cache")
+        found = {
+            "kind": "leaderboard",
+            "version": version("usm-gym"),
+            **document(list(zip(chosen, outcomes, strict=True)), fronts),
+            "provenance": provenance({"suites": list(NAMES)}),
+        }
+        require(
+            MAIN in found["suites"], "--policies", arguments.policies, "one that acts, at least"
+        )
+        write_json(folder / "leaderboard.json", found)
+        write_text(folder / "leaderboard.csv", csv_text(found))
+        write_text(folder / "leaderboard.md", markdown(found))
+        if page is not None:
+            write_text(arguments.insert, with_table(page, found))
+        draw_all(found, folder)
+    output_console().print(Markdown(table(found["suites"][MAIN])))
+    leave_if_refused({id: why for rows in found["refused"].values() for id, why in rows.items()})

@@ -1,0 +1,82 @@
+"""`usm report`: results as a page."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rich.progress import Progress, TaskID
+
+from usm_cli.options import add_computing, check_installed, computing, count
+from usm_cli.selection import POLICIES, chosen_contenders
+from usm_cli.terminal import output_console, progress_bar
+from usm_gym.support.files import check_writable, write_text
+from usm_gym.support.provenance import provenance
+
+DESCRIPTION = """\
+Show results as one page of HTML that needs nothing but itself: sortable tables with intervals, an
+episode of every policy to be played, its errors over time, error against thrust variation or
+against the quantity that was varied, conditions and provenance. Results are what `usm evaluate`,
+`usm leaderboard`, `usm robustness` and `usm reproduce` leave as JSON. Needs the extra `report`.
+"""
+EXAMPLES = f"""\
+{POLICIES}
+examples:
+  usm report results/0.1.0/leaderboard.json --output page.html
+  usm report mine.json results/robustness/noise.json --output page.html
+  usm report mine.json --scenario 7 --policies sta,my_module:MyController --output page.html
+"""
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "report",
+        help="results as a page with replays",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("results", nargs="+", metavar="RESULT.json", help="files of results")
+    add("--output", required=True, metavar="FILE", help="the page to write, .html")
+    add(
+        "--policies",
+        metavar="A,B",
+        help="which to replay (default: those of the result, but no code of your own)",
+    )
+    add("--scenario", type=int, metavar="I", help="which episode to replay, from 0 on (default: 0)")
+    add_computing(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Replay, write the page."""
+    check_installed("usm report", "report", "jinja2")
+    # These need the extra.
+    from usm_cli.report.chapters import Choice, chapter, read
+    from usm_cli.report.page import html
+
+    path = Path(arguments.output)
+    check_writable(path)
+    contenders = None if arguments.policies is None else chosen_contenders(arguments.policies)
+    scenario = count(arguments, "scenario", 0, least=0)
+    files = [Path(name) for name in arguments.results]
+    for file in files:
+        read(file)  # refuses what is no result before anything is computed
+    chapters = []
+    with computing(arguments) as workers, progress_bar() as bar:
+        choice = Choice(contenders, scenario, workers)
+        for file in files:
+            line = bar.add_task(f"replay {file.name}")
+            chapters.append(chapter(file, choice, partial(advance, bar, line)))
+    write_text(path, html(chapters, provenance({})))
+    size = path.stat().st_size / 1e6
+    output_console().print(f"{path}: {size:.1f} MB", markup=False, soft_wrap=True)
+
+
+def advance(bar: Progress, line: TaskID, done: int, total: int) -> None:
+    """Say on a line of the progress bar how many episodes are done."""
+    bar.update(line, completed=done, total=total)

@@ -1,0 +1,93 @@
+"""`usm study`: train and compare agents."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from rich.markdown import Markdown
+
+from usm_cli.options import add_computing, check_installed, computing, output_folder
+from usm_cli.terminal import output_console, progress_bar
+from usm_gym.support.files import holding, write_json, write_text
+from usm_gym.support.provenance import provenance
+from usm_gym.support.validation import require
+
+DESCRIPTION = """\
+Train the agents that are shipped, and others that lack one thing each, under several seeds; score
+them and the classical policies on unseen scenarios, at home and elsewhere; and look at what the
+agents do to their bases. Writes study.json, study.md and figures (extra `render`) into a folder,
+and each training into a folder of its own in `runs` there. An interrupted study goes on where it
+stopped, also within a training: its checkpoint, which is code, is run if its plan is that of the
+study, so give --output a folder of your own. A folder that holds another training, or parts of one
+without its plan, is refused. Takes hours on two cores. Needs the extra `agents`.
+"""
+EXAMPLES = """\
+examples:
+  usm study residual --workers 2                             all of it
+  usm study residual --only residual-ppo,rl-only --seeds 2   two agents under two seeds
+  usm study residual --only reference,scale-3 --steps 20000 --output try
+"""
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "study",
+        help="train and compare agents",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument
+    add("subject", choices=["residual"], help="what is studied")
+    add("--only", metavar="A,B", help="some agents and ablations, by name (default: all)")
+    add("--seeds", type=int, default=5, metavar="N", help="seeds of each, at most")
+    add("--steps", type=int, metavar="N", help="steps of each training (default: each its own)")
+    add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
+    add_computing(parser)
+    add("--output", default="results/study", metavar="DIR", help="default: results/study")
+    add(
+        "--ship",
+        metavar="DIR",
+        help="put each agent, as its seed 0, into a folder of its own there",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train, score, write the folder, print the tables."""
+    check_installed("usm study", "agents", "sb3_contrib")
+    from usm_agents.learning.plan import TEST_SEED
+    from usm_agents.study import figures, page, plans, scores, trainings
+    from usm_agents.study.dissection import dissected
+
+    for name, least in (("seeds", 1), ("episodes", 2), ("steps", 1)):
+        value = getattr(arguments, name)
+        require(value is None or value >= least, f"--{name}", value, f"{least} or more")
+    names = list(plans.PLANS) if arguments.only is None else arguments.only.split(",")
+    folder = output_folder(arguments.output)
+    runs = trainings.runs(names, arguments.seeds, folder, arguments.steps)
+    with holding(folder):
+        with computing(arguments) as workers, progress_bar() as bar:
+            line = bar.add_task("trainings", total=len(runs))
+            trainings.train_all(runs, workers, lambda run: bar.advance(line))
+            tasks = scores.tasks(runs, plans.RIVALS, arguments.episodes)
+            line = bar.add_task(
+                "episodes", total=sum(len(task.scenarios) for task in tasks.values())
+            )
+            cache = folder / "cache"
+            outcomes = scores.score(tasks, workers, cache, lambda count: bar.advance(line, count))
+            found = {
+                **scores.document(runs, outcomes, plans.RIVALS),
+                "episodes": arguments.episodes,
+                "dissected": dissected(runs),
+                "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
+            }
+        write_json(folder / "study.json", found)
+        if arguments.ship is not None:
+            trainings.ship(runs, Path(arguments.ship), found["provenance"])
+        text = page.markdown(found)
+        write_text(folder / "study.md", text)
+        figures.draw_all(found, folder)
+    output_console().print(Markdown(text))

@@ -1,0 +1,97 @@
+"""`usm train`: train an agent on the residual task."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from usm_cli.options import check_installed, parse_conditions
+from usm_cli.terminal import output_console, progress_bar
+from usm_gym.support.text import mm
+from usm_gym.support.validation import require
+
+DESCRIPTION = """\
+Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
+--policies takes, its learning curve on held-out scenarios of the training distribution, logs for
+TensorBoard, and the last checkpoint. Frozen suites are never seen. `usm train --resume --output
+DIR` goes on from the last checkpoint, and ends as if it had never been interrupted. A checkpoint is
+code, and to resume is to run it: do so only where you trained yourself. Without --resume a folder
+that holds anything of a training is refused, and nothing in it is opened. Needs the extra `agents`.
+"""
+EXAMPLES = """\
+examples:
+  usm train --output mine                             PPO on the paper's controller
+  usm train --algorithm tqc --base pd --output mine   another algorithm on another base
+  usm train --resume --output mine                    go on after an interruption
+  usm evaluate --policies sta,mine                    what it has gained
+"""
+# Options that make the plan, by the names of its fields.
+OPTIONS = (
+    ("algorithm", str, "A", "ppo, recurrent-ppo, sac, td3 or tqc (default: ppo)"),
+    ("env", str, "ID", "residual task (default: usm_agents:USM-OperationResidual-v0)"),
+    ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
+    ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),
+    ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
+    ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
+    ("seed", int, "S", "seed of everything random (default: 0)"),
+    ("steps", int, "N", "steps of all robots together (default: 3000000)"),
+    ("interval", int, "N", "steps between checkpoints (default: 250000)"),
+)
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "train",
+        help="train an agent",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
+    add = parser.add_argument
+    for name, kind, metavar, text in OPTIONS:
+        add(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
+    add("--omit", metavar="A,B", help="entries of the observation that the agent is not shown")
+    add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
+    add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
+    add(
+        "--resume",
+        action="store_true",
+        help="go on from the last checkpoint there, which is code that is run: only from your own",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Train, with a progress bar, and say what came of it."""
+    folder = Path(arguments.output)
+    check_installed("usm train", "agents", "sb3_contrib")
+    from usm_agents.learning.plan import Plan, read_plan
+    from usm_agents.learning.training import train
+
+    names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
+    given = {name: getattr(arguments, name) for name in names}
+    given = {name: value for name, value in given.items() if value is not None}
+    if "omit" in given:
+        given["omit"] = tuple(given["omit"].split(","))
+    if "conditions" in given:
+        given["conditions"] = parse_conditions(given["conditions"])
+    if arguments.resume:
+        require(not given, "--resume", ", ".join(given), "--output alone; the rest is kept there")
+        plan = read_plan(folder)
+    else:
+        plan = Plan(**given)
+    with progress_bar() as bar:
+        line = bar.add_task("", total=plan.steps)
+
+        def show(steps: int, validation: str) -> None:
+            bar.update(line, completed=steps, description=validation)
+
+        curve = train(plan, folder, show, arguments.resume)
+    best = min(curve, key=lambda point: point["max_error_x"] + point["max_error_y"])
+    console = output_console()
+    for name, point in (("before", curve[0]), ("best", best), ("last", curve[-1])):
+        console.print(
+            f"{name}: {mm(point['max_error_x'])} / {mm(point['max_error_y'])} mm "
+            f"after {point['steps']} steps, {point['seconds']:.0f} s",
+        )

@@ -1,0 +1,106 @@
+"""`usm watch`: policies at work."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from usm_cli.options import check_installed
+from usm_cli.selection import (
+    POLICIES,
+    add_policies,
+    add_scenarios,
+    chosen_contenders,
+    chosen_scenario,
+)
+from usm_cli.take import instants, take
+from usm_cli.terminal import empty_table, output_console, progress_bar
+from usm_gym.evaluation import Trajectory, score
+from usm_gym.support.files import check_writable
+from usm_gym.support.text import mm
+from usm_gym.support.validation import require
+
+DESCRIPTION = """\
+Watch a policy in an episode, or two side by side on the same scenario and noise, in a window
+(Escape closes it) or in a file. Shown are the robot and the posture it shall have, the jets of its
+thrusters, the track of its centre of mass, and its error, magnified and against time. Needs the
+extra `render`.
+"""
+EXAMPLES = f"""\
+{POLICIES}
+examples:
+  usm watch                                     the super-twisting controller in a window
+  usm watch --policies pd,sta                   two policies side by side
+  usm watch --policies sta --output run.mp4     a film; run.gif for a page that shows no films
+  usm watch --suite torpedo --scenario 7        another episode
+  usm watch --seed 3 --speed 4                  a sampled one, four times as fast
+"""
+
+
+def add_to(subparsers: Any) -> None:
+    """Add the command."""
+    parser = subparsers.add_parser(
+        "watch",
+        help="see policies at work, in a window or a film",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
+    add_policies(parser, default="sta")
+    add_scenarios(parser, single=True)
+    add = parser.add_argument
+    add("--speed", type=float, default=1.0, metavar="X", help="times real time (default: 1)")
+    add("--output", metavar="FILE", help="write a film, .mp4 or .gif, instead of showing it")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Simulate, then write or show, then print the scores."""
+    check_installed("usm watch", "render", "pygame", "matplotlib", "imageio_ffmpeg")
+    # These need the extra.
+    from usm_cli import film
+    from usm_gym.rendering.window import has_display
+
+    speed, path = arguments.speed, arguments.output and Path(arguments.output)
+    require(0.01 <= speed <= 1000, "--speed", speed, "0.01 to 1000")
+    medium = "window"
+    if path:
+        medium = path.suffix
+        require(medium in film.FPS, "--output", arguments.output, "a file .mp4 or .gif")
+        check_writable(path)
+    else:
+        require(has_display(), "--output", None, "a file .mp4 or .gif, for there is no display")
+    contenders = chosen_contenders(arguments.policies or "sta")
+    require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
+    scenario = chosen_scenario(arguments)
+    fps = film.FPS[medium]
+    shown = instants(scenario, fps, speed)
+    with progress_bar() as bar:
+        line = bar.add_task("simulate", total=len(contenders))
+        takes = [
+            take(each, scenario, shown, lambda episodes: bar.advance(line, episodes))
+            for each in contenders
+        ]
+        made = film.Film(takes, len(shown), film.WIDTHS[medium][len(takes) - 1])
+        if path:
+            line = bar.add_task("draw", total=made.length)
+            film.write(made, path, fps, lambda frames: bar.advance(line, frames))
+    if not path:
+        film.play(made, fps)
+    output_console().print(table({each.name: each.trajectory for each in takes}))
+
+
+def table(trajectories: dict[str, Trajectory]) -> Table:
+    """The errors of the episode in mm."""
+    rows = empty_table(
+        "policy",
+        numbers=("x", "y", "lost"),
+        title="largest position error after settling, mm, in this episode",
+    )
+    for name, trajectory in trajectories.items():
+        row = score(trajectory)
+        errors = [mm(row[f"max_error_{axis}"]) for axis in "xy"]
+        rows.add_row(name, *errors, "yes" if trajectory.lost else "no")
+    return rows

@@ -1,0 +1,116 @@
+"""Policies at work, side by side: as a film in a file or in a window (needs the extra `render`)."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import numpy as np
+
+from usm_cli.take import Take
+from usm_gym.rendering.canvas import Canvas, Frame, error_scale
+from usm_gym.rendering.window import Window
+from usm_gym.support.files import replacing
+
+# It warns of films that Ctrl-C has ended before their first frame; they are removed anyway.
+logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
+
+# Frames per second of each medium, and how wide a policy's frame is: alone, and beside another.
+# A GIF's times are multiples of 0.01 s, and it grows fast.
+FPS = {".mp4": 25.0, ".gif": 12.5, "window": 50.0}
+WIDTHS = {".mp4": (960, 640), ".gif": (640, 480), "window": (960, 640)}
+# A GIF has one palette, so that a frame holds only what differs from the one before. It is made of
+# a few frames that are sent ahead, lest the encoder keep the whole film to find its colours.
+AHEAD = 8
+GIF = (
+    f"split[a][b];[a]trim=end_frame={AHEAD},palettegen=max_colors=64[p];"
+    f"[b]trim=start_frame={AHEAD},setpts=PTS-STARTPTS[c];"
+    "[c][p]paletteuse=dither=none:diff_mode=rectangle"
+)
+
+
+class Film:
+    """Takes of the same scenario side by side, their errors to the same scale.
+
+    Attributes:
+        size: Width and height of a frame.
+        length: How many frames there are.
+    """
+
+    def __init__(self, takes: Sequence[Take], length: int, width: int) -> None:
+        """Cut a film of `length` frames, each take `width` pixels wide."""
+        self._takes = takes
+        self._canvases = [Canvas(width) for _ in takes]
+        self._scale = max(error_scale(each.pictures[-1].errors) for each in takes)
+        height = self._canvases[0].size[1]
+        self.size = (width * len(takes), height)
+        self.length = length
+
+    def frame(self, index: int) -> Frame:
+        """Draw a frame."""
+        drawn = [
+            canvas.draw(each.pictures[min(index, len(each.pictures) - 1)], each.name, self._scale)
+            for canvas, each in zip(self._canvases, self._takes, strict=True)
+        ]
+        return drawn[0] if len(drawn) == 1 else np.concatenate(drawn, axis=1)
+
+
+def write(
+    film: Film, path: Path, fps: float, progress: Callable[[int], object] = lambda frames: None
+) -> None:
+    """Write a film to an .mp4 or .gif file, in one move.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    options: dict[str, Any]
+    ahead: list[int] = []
+    if path.suffix == ".gif":
+        options = {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-vf", GIF]}
+        options |= {"quality": None, "macro_block_size": 1}
+        ahead = np.linspace(0, film.length - 1, AHEAD).astype(int).tolist()
+    else:
+        options = {"codec": "libx264", "quality": 6}
+        options |= {"output_params": ["-preset", "veryfast", "-movflags", "+faststart"]}
+    with replacing(path) as part:
+        try:
+            with closing(
+                imageio_ffmpeg.write_frames(
+                    part, film.size, fps=fps, ffmpeg_log_level="quiet", **options
+                )
+            ) as writer:
+                writer.send(None)
+                for index in ahead:
+                    writer.send(film.frame(index))
+                for index in range(film.length):
+                    writer.send(film.frame(index))
+                    progress(1)
+            # The encoder reports nothing, so that a full disk is found by looking.
+            written, _ = imageio_ffmpeg.count_frames_and_secs(part)
+        except (OSError, RuntimeError) as error:
+            raise OSError(f"cannot write {path}: the encoder stopped; is the disk full?") from error
+        if written != film.length:
+            raise OSError(f"cannot write {path}: {written} of {film.length} frames fit")
+
+
+def play(film: Film, fps: float) -> None:
+    """Show a film in a window, leaving out what comes too late, until its end or a closed window.
+
+    Escape and Q close it, too.
+    """
+    window = Window(film.size, "usm watch")
+    begin = time.perf_counter()
+    try:
+        index = 0
+        while index < film.length and not window.closed:
+            window.show(film.frame(index), fps)
+            index = max(index + 1, round((time.perf_counter() - begin) * fps))
+        if not window.closed:
+            window.show(film.frame(film.length - 1), fps)
+    finally:
+        window.close()

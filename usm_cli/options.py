@@ -1,0 +1,123 @@
+"""Options that commands share: conditions, what to compute on, where to write."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import joblib
+
+from usm_gym.support.files import check_writable, parse_json
+from usm_gym.support.validation import require
+from usm_gym.task.conditions import Conditions, conditions_of
+
+# How long a cluster may take to accept a connection, s.
+CONNECTION_TIME = 10.0
+# The largest count that an option takes: more is a slip of the pen.
+MOST, MOST_WORKERS = 1_000_000_000, 1000
+
+
+def check_installed(what: str, extra: str, *modules: str) -> None:
+    """Refuse what needs a module that is not installed.
+
+    Args:
+        what: What needs it.
+        extra: The extra that it comes with.
+        modules: Names under which the modules are imported.
+
+    Raises:
+        ValueError: If one is not there.
+    """
+    for module in modules:
+        if find_spec(module) is None:
+            package = module.replace("_", "-")
+            raise ValueError(f"{what} needs {package}: pip install 'usm-gym[{extra}]'")
+
+
+def add_computing(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say on what to compute."""
+    add = parser.add_argument
+    add("--workers", type=int, metavar="N", help="processes (default: 1; of a cluster: all)")
+    add(
+        "--cluster",
+        metavar="ADDRESS",
+        help="a Ray cluster of your own to compute on (the extra `cluster`); Ray runs the code of "
+        "whoever reaches it",
+    )
+
+
+@contextmanager
+def computing(arguments: argparse.Namespace) -> Iterator[int]:
+    """Make the cluster that the options ask for joblib's backend; gives the number of workers."""
+    workers = arguments.workers
+    allowed = f"1 to {MOST_WORKERS}"
+    require(workers is None or 1 <= workers <= MOST_WORKERS, "--workers", workers, allowed)
+    if arguments.cluster is None:
+        yield workers or 1
+        return
+    check_installed("--cluster", "cluster", "ray")
+    import ray
+    from ray.util.joblib import register_ray
+
+    check_reachable(arguments.cluster)
+    try:
+        ray.init(address=arguments.cluster, logging_level=logging.ERROR, log_to_driver=False)
+    except RuntimeError as error:
+        raise ConnectionError(f"no Ray cluster at {arguments.cluster}: {error}") from error
+    try:
+        register_ray()
+        with joblib.parallel_config(backend="ray"):
+            yield workers or int(ray.cluster_resources().get("CPU", 1))
+    finally:
+        ray.shutdown()
+
+
+def check_reachable(address: str) -> None:
+    """Raise `ConnectionError` now where nobody listens, for whom Ray would wait for minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon:
+        return  # a word that Ray knows, such as "auto"
+    require(port.isdigit(), "--cluster", address, "HOST:PORT")
+    try:
+        socket.create_connection((host, int(port)), CONNECTION_TIME).close()
+    except OSError as error:
+        raise ConnectionError(f"no Ray cluster at {address}: {error}") from error
+
+
+def parse_conditions(text: str) -> Conditions:
+    """Conditions from a preset's name or a JSON object."""
+    if text.lstrip()[:1] not in ("{", "["):
+        return conditions_of(text)
+    return conditions_of(parse_json(text, f"--conditions {text}"))
+
+
+def count(arguments: Any, option: str, default: int, least: int = 1) -> int:
+    """An integer option, or its default.
+
+    Raises:
+        ValueError: If it is too small or too large.
+    """
+    value = getattr(arguments, option)
+    allowed = f"{least} to {MOST}"
+    require(value is None or least <= value <= MOST, f"--{option}", value, allowed)
+    return default if value is None else int(value)
+
+
+def output_folder(name: str) -> Path:
+    """An output folder with figures, made if it is not there.
+
+    Raises:
+        ValueError: If figures cannot be drawn.
+        OSError: If nothing can be written there.
+    """
+    check_installed("drawing figures", "render", "matplotlib")
+    folder = Path(name)
+    folder.mkdir(parents=True, exist_ok=True)
+    check_writable(folder / "table")
+    return folder

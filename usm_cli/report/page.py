@@ -1,0 +1,51 @@
+"""Puts chapters into the page's templates (needs the extra `report`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+
+from usm_cli.report.blocks import Chapter
+
+ASSETS = files(__package__)
+STYLES = ("uplot/uPlot.min.css", "page/page.css")
+SCRIPTS = (
+    "uplot/uPlot.iife.min.js",
+    "page/tables.js",
+    "page/charts.js",
+    "page/plots.js",
+    "page/drawing.js",
+    "page/replay.js",
+    "page/page.js",
+)
+
+
+def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
+    """One page with all chapters, which needs nothing but itself.
+
+    Args:
+        chapters: What it shows.
+        made: What made it, as `usm_gym.support.provenance` says.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("usm_cli.report", "page"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    return environment.get_template("page.html").render(
+        chapters=chapters,
+        motion=next((each.motion for each in chapters if each.motion), ""),
+        verdict=next((each.verdict for each in chapters if each.verdict), ""),
+        made=made,
+        styles=_text(STYLES),
+        scripts=_text(SCRIPTS),
+    )
+
+
+def _text(names: Sequence[str]) -> str:
+    return "\n".join(ASSETS.joinpath(name).read_text(encoding="utf-8") for name in names)

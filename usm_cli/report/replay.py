@@ -1,0 +1,190 @@
+"""Episodes for a page: computed anew, thinned out and packed."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from usm_baselines.contender import Contender
+from usm_baselines.paper.paper_rate import Record
+
+from usm_cli.take import instants, take
+from usm_gym.evaluation import score
+from usm_gym.robot import Robot
+from usm_gym.support import parallel
+from usm_gym.task.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+# Pictures of the robot per second; errors and thrust are kept as often as they are measured.
+FPS = 10.0
+# Of a record at the paper's step, one error and effort every so often, s.
+RECORD_PERIOD = 0.01
+INT16 = 32767
+# Scores that differ by more than this share are not those of the result.
+TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Acted:
+    """What a policy did.
+
+    Attributes:
+        data: What the page plays of it.
+        reference: Link angles of the reference posture at each picture, rad, (pictures, links).
+        current: Velocity of the water at each picture, m/s, (pictures, 2).
+        max_error: Largest error after settling, m, x and y.
+    """
+
+    data: dict[str, Any]
+    reference: Array
+    current: Array
+    max_error: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """One scenario, as several policies met it.
+
+    Attributes:
+        data: What the page plays.
+        max_error: Largest error after settling of each policy, m, x and y.
+        missing: Why a policy is not there, by name.
+    """
+
+    data: dict[str, Any]
+    max_error: dict[str, tuple[float, float]]
+    missing: dict[str, str]
+
+
+def packed(values: Array) -> dict[str, Any]:
+    """An array as 16-bit integers, in base64, with the scale that gives it back."""
+    scale = float(np.abs(values).max(initial=0.0)) / INT16 or 1.0
+    whole = np.rint(values / scale).astype("<i2")
+    data = base64.b64encode(whole.tobytes()).decode()
+    return {"shape": list(values.shape), "scale": scale, "data": data}
+
+
+def replayed(
+    contenders: Sequence[Contender],
+    scenario: Scenario,
+    workers: int,
+    progress: Callable[[], object],
+) -> Episodes:
+    """Let policies act in a scenario.
+
+    Args:
+        contenders: The policies.
+        scenario: The scenario.
+        workers: Number of processes.
+        progress: Called after each of them.
+
+    Returns:
+        What they did; nobody's if none of them acts.
+    """
+    done: dict[int, Acted | str] = {}
+    tasks = [(contender, scenario) for contender in contenders]
+    for index, outcome in parallel.results(act, tasks, workers):
+        done[index] = outcome
+        progress()
+    acted: dict[str, Acted] = {}
+    missing: dict[str, str] = {}
+    for index, contender in enumerate(contenders):
+        outcome = done[index]
+        if isinstance(outcome, str):
+            missing[contender.name] = outcome
+        else:
+            acted[contender.name] = outcome
+    if not acted:
+        return Episodes({"episodes": {}}, {}, missing)
+    longest = max(acted.values(), key=lambda each: len(each.reference))
+    period = scenario.conditions.control_period
+    shown = instants(scenario, FPS, 1.0)
+    data = frame(scenario, Robot(), scenario.reference_positions()[shown]) | {
+        "start": period,
+        "period": period,
+        "current": packed(longest.current),
+        "reference": packed(longest.reference),
+        "episodes": {name: each.data for name, each in acted.items()},
+    }
+    return Episodes(data, {name: each.max_error for name, each in acted.items()}, missing)
+
+
+def act(contender: Contender, scenario: Scenario) -> Acted | str:
+    """Let a policy act in a scenario; or why it cannot."""
+    try:
+        found = take(contender, scenario, instants(scenario, FPS, 1.0))
+    except ValueError as error:
+        return str(error)
+    pictures, row = found.pictures, score(found.trajectory)
+    data = {
+        "theta": packed(np.array([each.body.angles for each in pictures])),
+        "thrust": packed(np.array([each.thrust for each in pictures])),
+        "error": packed(pictures[-1].errors[1:]),
+        "effort": packed(np.abs(found.trajectory.command).mean(axis=1)),
+        "lost": found.trajectory.lost,
+    }
+    return Acted(
+        data,
+        np.array([each.reference.angles for each in pictures]),
+        np.array([each.current for each in pictures]),
+        (float(row["max_error_x"]), float(row["max_error_y"])),
+    )
+
+
+def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any]:
+    """What the page plays of records at the paper's step, by the name of their law."""
+    first = next(iter(records.values()))
+    spacing = float(first.time[1] - first.time[0])
+    every, sparse = round(RECORD_PERIOD / spacing), round(1.0 / (FPS * spacing))
+    return frame(scenario, Robot(), first.reference[::sparse]) | {
+        "start": 0.0,
+        "period": every * spacing,
+        "current": None,
+        "reference": None,
+        "episodes": {
+            name: {
+                "theta": packed(record.theta[::sparse]),
+                "thrust": None,
+                "error": packed(record.error[::every]),
+                "effort": packed(record.effort[::every]),
+                "lost": False,
+            }
+            for name, record in records.items()
+        },
+    }
+
+
+def frame(scenario: Scenario, robot: Robot, path: Array) -> dict[str, Any]:
+    """What all policies of a scenario have in common; path: at every picture, m, (k, 2)."""
+    return {
+        "duration": scenario.duration,
+        "settle": scenario.settle_time,
+        "shifts": list(scenario.shifts),
+        "limit": scenario.conditions.thruster_limit,
+        "frame": 1.0 / FPS,
+        "robot": {
+            "length": robot.link_length,
+            "halfWidth": robot.half_width,
+            "thrusters": [
+                {"link": each.link - 1, "normal": each.direction == "normal"}
+                for each in robot.thrusters
+            ],
+        },
+        "path": packed(path),
+    }
+
+
+def differing(
+    found: Mapping[str, tuple[float, float]], expected: Mapping[str, tuple[float, float]]
+) -> list[str]:
+    """Policies whose largest errors, m, in x and y, are not as expected."""
+    return [
+        name
+        for name, errors in expected.items()
+        if not np.allclose(found[name], errors, rtol=TOLERANCE, atol=0.0)
+    ]

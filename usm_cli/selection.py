@@ -1,0 +1,202 @@
+"""Which policies on which scenarios: what `usm evaluate`, `compare` and others have in common."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from usm_agents.policies import named
+from usm_baselines.benchmark.scoring import (
+    BATCH,
+    TIME_LIMIT,
+    Refusal,
+    Task,
+    score_all,
+    shared_nominal,
+)
+from usm_baselines.contender import Contender
+from usm_baselines.registry import entry, ids
+
+from usm_cli.options import add_computing, computing, count, parse_conditions
+from usm_cli.terminal import progress_bar
+from usm_gym.evaluation import Evaluation
+from usm_gym.robot import Robot
+from usm_gym.suites import NAMES, suite, unseen
+from usm_gym.support.files import read_json
+from usm_gym.support.validation import in_one_line, require
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.scenario import MODES, Mode, Scenario
+
+POLICIES = """\
+policies:
+  an id (usm policies), ID@gains.json with gains from `usm tune`, the folder of an agent from
+  `usm train`, or my_module:MyController, a class or factory of your own with Stable-Baselines3's
+  predict (docs/own_controller.md)
+"""
+
+
+def add_policies(parser: argparse.ArgumentParser, default: str = "all competitors") -> None:
+    """Add the option that names policies."""
+    parser.add_argument("--policies", metavar="A,B", help=f"names, by commas (default: {default})")
+
+
+def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None:
+    """Add the options that choose scenarios, or a single one."""
+    add = parser.add_argument
+    add(
+        "--suite",
+        metavar="NAME",
+        help=f"frozen suite ({', '.join(NAMES)}; default: operation) or a file of scenarios",
+    )
+    add("--seed", type=int, metavar="S", help="sample scenarios under this seed instead")
+    if single:
+        add("--scenario", type=int, metavar="I", help="which of them, from 0 on (default: 0)")
+        parser.set_defaults(episodes=None)
+    else:
+        add("--episodes", type=int, metavar="N", help="how many to sample (default: 50)")
+    add("--mode", choices=MODES, help="mode of sampled scenarios (default: operation)")
+    add(
+        "--conditions",
+        metavar="C",
+        help="ideal, field, rough, or a JSON object of fields on top of field; "
+        "on a suite it overrides the suite's own (default: the suite's; field)",
+    )
+
+
+def add_scoring(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how scores are computed."""
+    add_computing(parser)
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=TIME_LIMIT,
+        metavar="S",
+        help=f"how long a controller of your own may think in a batch of up to {BATCH} episodes, "
+        f"s (default: {TIME_LIMIT:g})",
+    )
+
+
+def chosen_contenders(names: str | None) -> list[Contender]:
+    """The policies that `--policies` asks for."""
+    if names is None:
+        chosen = [id for id in ids() if not (entry(id).slow or entry(id).privileged)]
+    else:
+        chosen = [name.strip() for name in names.split(",") if name.strip()]
+    require(len(chosen) > 0, "--policies", names, "one name or more")
+    return [named(name) for name in dict.fromkeys(chosen)]
+
+
+def sampled(arguments: argparse.Namespace) -> bool:
+    """Whether scenarios are to be sampled."""
+    return any(value is not None for value in (arguments.seed, arguments.episodes, arguments.mode))
+
+
+def suite_name(arguments: argparse.Namespace) -> str | None:
+    """Name of the suite that the options ask for; None where scenarios are sampled."""
+    return None if sampled(arguments) else arguments.suite or "operation"
+
+
+def seeds(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Where the scenarios come from."""
+    name = suite_name(arguments)
+    return {"seed": arguments.seed or 0} if name is None else {"suite": name}
+
+
+def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
+    """The scenarios that the options ask for."""
+    given = arguments.conditions
+    conditions = None if given is None else parse_conditions(given)
+    name = suite_name(arguments)
+    if name is not None:
+        scenarios = read_suite(name)
+        return [each.under(conditions) for each in scenarios] if conditions else scenarios
+    require(
+        arguments.suite is None,
+        "--suite",
+        arguments.suite,
+        "no suite beside --seed, --episodes, --mode",
+    )
+    episodes = count(arguments, "episodes", 50)
+    seed = count(arguments, "seed", 0, least=0)
+    mode: Mode = arguments.mode or "operation"
+    return unseen(mode, conditions or Conditions(), seed, episodes)
+
+
+def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
+    """The one scenario that the options ask for."""
+    index = count(arguments, "scenario", 0, least=0)
+    if sampled(arguments):
+        arguments.episodes = index + 1
+    scenarios = chosen_scenarios(arguments)
+    require(index < len(scenarios), "--scenario", index, f"0 to {len(scenarios) - 1}")
+    return scenarios[index]
+
+
+def read_suite(name: str) -> list[Scenario]:
+    """The scenarios of a frozen suite, or of a JSON file that holds a list of them."""
+    if not name.endswith(".json"):
+        return suite(name)
+    try:
+        listed = read_json(name)["scenarios"]
+        require(isinstance(listed, list) and listed, "scenarios", listed, "a list of one or more")
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{name} is no file of scenarios: {in_one_line(error)}") from error
+    scenarios = []
+    for index, data in enumerate(listed):
+        try:
+            scenarios.append(Scenario.from_dict(data))
+        except ValueError as error:
+            raise ValueError(f"{name}, scenario {index}: {in_one_line(error)}") from error
+    return scenarios
+
+
+def tasks(
+    contenders: Iterable[Contender], scenarios: Sequence[Scenario], time_limit: float
+) -> list[Task]:
+    """One task for each policy, all on the same scenarios.
+
+    Raises:
+        ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
+    """
+    robot = Robot()
+    nominal = shared_nominal(robot, scenarios)
+    found = []
+    for each in contenders:
+        each.make(nominal)
+        found.append(Task(each, tuple(scenarios), nominal, robot, time_limit))
+    return found
+
+
+def scored(
+    chosen: Sequence[Task], arguments: argparse.Namespace, cache: Path | None = None
+) -> list[Evaluation | Refusal]:
+    """Score tasks on what the options say, with a progress bar."""
+    with computing(arguments) as workers, progress_bar() as bar:
+        total = sum(len(task.scenarios) for task in chosen)
+        line = bar.add_task("episodes", total=total)
+        return score_all(chosen, workers, cache, lambda episodes: bar.advance(line, episodes))
+
+
+def by_name(
+    chosen: Sequence[Task], outcomes: Sequence[Evaluation | Refusal]
+) -> tuple[dict[str, Evaluation], dict[str, str]]:
+    """The scores of tasks by the name of the policy, and why the others have none."""
+    found: dict[str, Evaluation] = {}
+    refused: dict[str, str] = {}
+    for task, outcome in zip(chosen, outcomes, strict=True):
+        if isinstance(outcome, Refusal):
+            refused[task.contender.name] = outcome.reason
+        else:
+            found[task.contender.name] = outcome
+    return found, refused
+
+
+def leave_if_refused(refused: Mapping[str, str]) -> None:
+    """Name the refused policies, one on a line, and leave with status 1 if there is one."""
+    for name, reason in refused.items():
+        print(f"usm: {name} is refused: {reason}", file=sys.stderr)
+    if refused:
+        sys.exit(1)

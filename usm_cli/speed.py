@@ -1,0 +1,292 @@
+"""Speed, measured against peers in one run: interleaved rounds, medians, spread."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from usm_baselines.paper.paper_rate import Law, simulate
+from usm_baselines.registry import make
+
+from usm_gym.evaluation import evaluate
+from usm_gym.robot import Robot, Thruster
+from usm_gym.simulation import Simulation
+from usm_gym.suites import suite
+from usm_gym.support.seeding import EVALUATION, stream
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.nominal import nominal_of
+from usm_gym.task.scenario import Path as Track
+from usm_gym.task.scenario import Scenario, named, sample
+
+ROBOTS = 256
+SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
+HERE = Track(speed=0.0, amplitude=0.0)
+FIRST_STEP = """
+import gymnasium, usm_gym
+env = gymnasium.make("usm_gym:USM-Operation-v0")
+env.reset(seed=0)
+env.step(env.action_space.sample())
+"""
+
+
+@dataclass(frozen=True)
+class Task:
+    """Something to time.
+
+    Attributes:
+        name: Key of its figure.
+        run: Does it once.
+        units: How many units of work that is.
+        scale: From seconds per unit to the figure: 1e9 for ns.
+    """
+
+    name: str
+    run: Callable[[], object]
+    units: float
+    scale: float = 1e9
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A measured figure.
+
+    Attributes:
+        median: Median over rounds.
+        low: Smallest.
+        high: Largest.
+    """
+
+    median: float
+    low: float
+    high: float
+
+
+def summarise(values: Any) -> Figure:
+    """Median and spread of one figure's rounds."""
+    return Figure(*(float(each) for each in (np.median(values), np.min(values), np.max(values))))
+
+
+def interleaved(
+    tasks: list[Task], rounds: int, progress: Callable[[], object]
+) -> dict[str, list[float]]:
+    """Time all tasks once per round, after one run each that is not counted."""
+    for task in tasks:
+        task.run()
+    times: dict[str, list[float]] = {task.name: [] for task in tasks}
+    for _ in range(rounds):
+        for task in tasks:
+            begin = time.perf_counter()
+            task.run()
+            times[task.name].append((time.perf_counter() - begin) / task.units * task.scale)
+        progress()
+    return times
+
+
+def plant_task(
+    name: str, size: int, period: float, threads: int = 1, robot: Robot | None = None
+) -> Task:
+    """Physics steps of `size` robots, per robot and step, with the joints moving.
+
+    Without thrust they have to keep near a reference that rests, or they would be lost.
+    """
+    body = robot or Robot()
+    conditions = Conditions(control_period=period, current_limit=0.0)
+    simulation = Simulation(body, resting(size, conditions, body), threads)
+    start = simulation.snapshot()
+    action = np.zeros((size, len(body.thrusters)), np.float32)
+
+    def run() -> None:
+        if simulation.count[0] == simulation.steps[0]:
+            simulation.restore(start)
+        simulation.step(action)
+
+    return Task(name, run, size * conditions.substeps)
+
+
+def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
+    """Sampled scenarios whose reference rests, so that robots are not lost without a controller."""
+    scenarios = [
+        replace(
+            sample("operation", conditions, stream(0, EVALUATION, i), robot.links - 1),
+            path=HERE,
+        )
+        for i in range(min(size, 64))
+    ]
+    return [scenarios[i % len(scenarios)] for i in range(size)]
+
+
+def vector_task(name: str, size: int, steps: int, threads: int = 1) -> Task:
+    """Whole steps of the vector environment, per robot, within episodes.
+
+    Starts of episodes are timed by `start_task`: how many there are depends on the policy.
+    """
+    envs = gym.make_vec(
+        "usm_gym:USM-Operation-v0",
+        num_envs=size,
+        vectorization_mode="vector_entry_point",
+        threads=threads,
+    )
+    options = {"scenario": resting(size, Conditions(current_limit=0.0), Robot())}
+    return _loop(name, envs, steps, size, options)
+
+
+def start_task(name: str, size: int) -> Task:
+    """Starts of episodes in the vector environment: draw, noise, first observation; us."""
+    envs = gym.make_vec(
+        "usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point"
+    )
+    envs.reset(seed=0)
+    return Task(name, envs.reset, size, 1e6)
+
+
+def sync_task(name: str, size: int, steps: int) -> Task:
+    """The same through Gymnasium's `SyncVectorEnv` of single environments."""
+    envs = gym.make_vec("usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="sync")
+    return _loop(name, envs, steps, size)
+
+
+def cartpole_task(name: str, size: int, steps: int) -> Task:
+    """Gymnasium's CartPole vector environment, per robot."""
+    envs = gym.make_vec("CartPole-v1", num_envs=size, vectorization_mode="vector_entry_point")
+    return _loop(name, envs, steps, size)
+
+
+def swimmer_task(name: str, steps: int) -> Task:
+    """Gymnasium's Swimmer-v5; raises `ImportError` or a Gymnasium error without MuJoCo."""
+    return _loop(name, gym.make("Swimmer-v5"), steps, 1)
+
+
+def mujoco_task(name: str, steps: int) -> Task:
+    """MuJoCo's C loop, Euler, on the same chain with ellipsoid fluid; `ImportError` without it."""
+    import mujoco
+    from mujoco import rollout
+
+    model = mujoco.MjModel.from_xml_string(mujoco_chain(Robot()))
+    data = mujoco.MjData(model)
+    data.qvel[:] = 0.1 * np.random.default_rng(0).standard_normal(model.nv)
+    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    state = np.zeros((1, mujoco.mj_stateSize(model, kind)))
+    mujoco.mj_getState(model, data, state[0], kind)
+    return Task(name, lambda: rollout.rollout(model, data, state, nstep=steps), steps)
+
+
+def mujoco_chain(robot: Robot) -> str:
+    """The robot without thrusters as a MuJoCo model."""
+    half = robot.half_length
+    geom = (
+        f'<geom type="ellipsoid" size="{half} {robot.half_height} {robot.half_width}" '
+        f'mass="{robot.link_mass}" fluidshape="ellipsoid" contype="0" conaffinity="0"/>'
+    )
+    joint = (
+        f'<joint axis="0 0 1" pos="{-half} 0 0" stiffness="{robot.joint_stiffness}" '
+        f'damping="{robot.joint_damping}"/>'
+    )
+    bodies = ""
+    for _ in range(robot.links - 1):
+        bodies = f'<body pos="{2 * half} 0 0">{joint}{geom}{bodies}</body>'
+    root = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint/>'
+    option = f'<option timestep="0.001" gravity="0 0 0" density="{robot.water_density}"/>'
+    world = f"<worldbody><body>{root}{geom}{bodies}</body></worldbody>"
+    return f"<mujoco>{option}{world}</mujoco>"
+
+
+def _loop(
+    name: str, env: Any, steps: int, size: int, options: dict[str, Any] | None = None
+) -> Task:
+    env.reset(seed=0, options=options)
+    env.action_space.seed(0)
+    single = isinstance(env, gym.Env)
+    # Random actions of mean zero, as at the start of a training.
+    samples = [env.action_space.sample() for _ in range(10)]
+    actions = samples if env.action_space.dtype.kind == "i" else [*samples, *(-a for a in samples)]
+
+    def run() -> None:
+        for k in range(steps):
+            outcome = env.step(actions[k % len(actions)])
+            if single and (outcome[2] or outcome[3]):
+                env.reset()
+
+    return Task(name, run, size * steps)
+
+
+def paper_rate() -> None:
+    """40 s at 1e-5 s with observer and super-twisting controller in every step."""
+    scenario = named("table1", "operation")
+    conditions = replace(scenario.conditions, control_period=1e-5, physics_step=1e-5)
+    simulate(replace(scenario, conditions=conditions), Law())
+
+
+def evaluate_suite() -> None:
+    """The operation suite by all six policies of the main job."""
+    scenarios = suite("operation")
+    nominal = nominal_of(Robot(), scenarios[0])
+    for id in ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero"):
+        evaluate(make(id, nominal), scenarios)
+
+
+def thousand_episodes() -> None:
+    """A thousand sampled operation episodes of 40 s with the super-twisting controller."""
+    scenarios = [sample("operation", Conditions(), stream(1, EVALUATION, i)) for i in range(1000)]
+    evaluate(make("sta", nominal_of(Robot(), scenarios[0])), scenarios)
+
+
+def timed(job: Callable[[], object]) -> float:
+    """Seconds that a job takes."""
+    begin = time.perf_counter()
+    job()
+    return time.perf_counter() - begin
+
+
+def first_step(compile_anew: bool) -> float:
+    """Seconds from starting Python to the first step, with a warm or an empty kernel cache."""
+    with tempfile.TemporaryDirectory() as empty:
+        environment = {**os.environ, **({"NUMBA_CACHE_DIR": empty} if compile_anew else {})}
+        begin = time.perf_counter()
+        subprocess.run([sys.executable, "-c", FIRST_STEP], env=environment, check=True)
+        return time.perf_counter() - begin
+
+
+def growth(rounds: int) -> Iterator[dict[str, float]]:
+    """Cost per robot and physics step, ns, for more links, more robots, more threads."""
+    for links in (4, 8, 16, 32, 64):
+        body = growing_robot(links)
+        for name, size, period in (("single", 1, SINGLE_PERIOD), ("batch", ROBOTS, BATCH_PERIOD)):
+            figure = _alone(plant_task(name, size, period, robot=body), rounds)
+            yield {"links": links, "robots": size, "threads": 1, "ns": figure}
+    for size in (1, 8, 64, 512, 4096):
+        for threads in (1, 2):
+            figure = _alone(plant_task("batch", size, 0.02, threads), rounds)
+            yield {"links": 16, "robots": size, "threads": threads, "ns": figure}
+
+
+def growing_robot(links: int) -> Robot:
+    """A robot of any number of links, thrusters where the paper's stand."""
+    places = sorted({1, *(max(2, round(links * place / 16)) for place in (3, 6, 11, 14))})
+    normal = tuple(Thruster(link, "normal") for link in places)
+    return Robot(links=links, thrusters=(Thruster(1, "axial"), *normal))
+
+
+def _alone(task: Task, rounds: int) -> float:
+    return summarise(interleaved([task], rounds, lambda: None)[task.name]).median
+
+
+def machine() -> dict[str, Any]:
+    """The machine that the figures are of."""
+    model = platform.processor() or platform.machine()
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        for line in information.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                model = line.split(":", 1)[1].strip()
+                break
+    return {"processor": model, "cores": os.cpu_count(), "system": platform.platform()}

@@ -1,0 +1,81 @@
+"""Episodes of policies, kept as pictures: what films and pages show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from usm_baselines.contender import Contender
+
+from usm_gym.evaluation import Trajectory, rollout
+from usm_gym.rendering.picture import Picture, Recorder
+from usm_gym.robot import Robot
+from usm_gym.simulation import Simulation
+from usm_gym.support.validation import in_one_line
+from usm_gym.task.nominal import nominal_of
+from usm_gym.task.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Take:
+    """An episode of a policy.
+
+    Attributes:
+        name: The policy's.
+        pictures: One for each frame, or fewer if the robot was lost, the last then showing that.
+        trajectory: The episode.
+    """
+
+    name: str
+    pictures: list[Picture]
+    trajectory: Trajectory
+
+
+def instants(scenario: Scenario, fps: float, speed: float) -> list[int]:
+    """The control instants that the frames of an episode show, played `speed` times real time."""
+    frames = max(1, round(fps * scenario.duration / speed))
+    times = np.arange(frames + 1) * (speed / fps)
+    counts = np.rint(times / scenario.conditions.control_period).astype(int)
+    listed: list[int] = np.minimum(counts, scenario.steps).tolist()
+    return listed
+
+
+def take(
+    contender: Contender,
+    scenario: Scenario,
+    shown: Sequence[int],
+    progress: Callable[[float], None] = lambda episodes: None,
+) -> Take:
+    """Let a policy act in a scenario.
+
+    Args:
+        contender: The policy.
+        scenario: The scenario.
+        shown: The control instants of which pictures are wanted, in order.
+        progress: As of `usm_gym.evaluate`.
+
+    Raises:
+        ValueError: If the policy cannot be made or fails to act.
+    """
+    robot, recorder, wanted = Robot(), Recorder(), set(shown)
+    seen: dict[int, Picture] = {}
+    lost = False
+
+    def watch(simulation: Simulation) -> None:
+        nonlocal lost
+        count = int(simulation.count[0])
+        recorder.note(simulation)
+        if not lost and (count in wanted or simulation.lost[0]):
+            seen[count] = recorder.picture(simulation)
+        lost |= bool(simulation.lost[0])
+
+    policy = contender.make(nominal_of(robot, scenario))
+    try:
+        (trajectory,) = rollout(policy, [scenario], robot, progress, watch)
+    except (Exception, SystemExit) as error:  # whatever a controller may do
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ValueError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
+    end = max(seen)
+    pictures = [seen[count] for count in shown if count < end] + [seen[end]]
+    return Take(contender.name, pictures, trajectory)

@@ -1,0 +1,59 @@
+"""What the commands share on the terminal: errors in one line, tables, progress."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable
+from typing import Any, NoReturn
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from usm_gym.support.validation import SAID, clipped
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that keeps the lines of its texts and says what is wrong in one."""
+
+    def __init__(self, **options: Any) -> None:
+        """Take the options of `argparse.ArgumentParser`."""
+        super().__init__(**options)
+        self.formatter_class = argparse.RawDescriptionHelpFormatter
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with status 2."""
+        said = clipped(" ".join(clipped(word) for word in message.split(" ")), SAID)
+        self.exit(2, f"{self.prog}: error: {said} (see {self.prog} --help)\n")
+
+
+def output_console() -> Console:
+    """Where results go: the terminal, or a pipe that gets full width."""
+    return Console() if sys.stdout.isatty() else Console(width=160, highlight=False)
+
+
+def progress_bar() -> Progress:
+    """A progress bar on standard error, shown on a terminal only."""
+    console = Console(stderr=True)
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def empty_table(*words: str, numbers: Iterable[str] = (), title: str | None = None) -> Table:
+    """A table without rows: columns of words, then columns of numbers, which are aligned right."""
+    table = Table(
+        *words, title=title, title_justify="left", title_style="", box=SIMPLE_HEAD, pad_edge=False
+    )
+    for heading in numbers:
+        table.add_column(heading, justify="right")
+    return table

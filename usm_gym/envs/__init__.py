@@ -1,0 +1,1 @@
+"""The Gymnasium environments, of one robot and of many."""

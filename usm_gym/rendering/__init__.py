@@ -1,0 +1,1 @@
+"""Pictures of the robot (need the extra `render`)."""

@@ -1,0 +1,119 @@
+"""What there is to see of a robot, as plain data: taken from a simulation, drawn by `rendering`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.robot import Robot
+from usm_gym.simulation import Simulation
+from usm_gym.task.scenario import Scenario
+
+Array = NDArray[np.float64]
+# A robot that is lost may be anywhere; it is shown no further than this from its reference, m.
+FAR = 10.0
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Where the links are.
+
+    Attributes:
+        centres: Centres of the links, tail first, m, (links, 2).
+        angles: Their angles, rad, (links,).
+    """
+
+    centres: Array
+    angles: Array
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One robot at one control instant, in the global frame; all numbers are finite.
+
+    Attributes:
+        robot: The robot.
+        scenario: Its scenario.
+        time: Time since the start, s.
+        body: The robot's true posture.
+        reference: The posture with the reference joint angles at the reference of the heading, its
+            centre of mass at the reference of the position.
+        thrust: Forces of the thrusters over their limit, (thrusters,).
+        current: Velocity of the water, m/s, (2,).
+        path: Reference of the centre of mass at every control instant of the episode, m, (k, 2).
+        instants: Which of these instants have been seen so far, rising, the last of them now.
+        errors: True position errors at these instants, m, (len(instants), 2).
+        max_error: Largest absolute error after settling, m, (2,).
+        lost: Whether the robot is lost.
+    """
+
+    robot: Robot
+    scenario: Scenario
+    time: float
+    body: Posture
+    reference: Posture
+    thrust: Array
+    current: Array
+    path: Array
+    instants: NDArray[np.int64]
+    errors: Array
+    max_error: Array
+    lost: bool
+
+
+class Recorder:
+    """Remembers what one robot of a simulation has done, for pictures with a past."""
+
+    def __init__(self, index: int = 0) -> None:
+        """Follow the robot `index`."""
+        self._index = index
+        self._scenario: Scenario | None = None
+
+    def note(self, simulation: Simulation) -> None:
+        """Remember the present; to be called at every control instant that a trail shall show."""
+        scenario, count = simulation.scenarios[self._index], simulation.count[self._index]
+        if scenario is not self._scenario or count == 0:
+            self._scenario = scenario
+            self._path = scenario.reference_positions()
+            self._errors = np.full_like(self._path, np.nan)
+        self._errors[count] = simulation.error[self._index]
+
+    def picture(self, simulation: Simulation) -> Picture:
+        """Describe the present."""
+        self.note(simulation)
+        index, robot, scenario = self._index, simulation.robot, simulation.scenarios[self._index]
+        count = int(simulation.count[index])
+        here = self._path[count]
+        theta = np.nan_to_num(simulation.theta[index])
+        position = np.clip(np.nan_to_num(simulation.position[index]), here - FAR, here + FAR)
+        wanted = reference_angles(simulation, index)
+        instants = np.flatnonzero(np.isfinite(self._errors[: count + 1, 0]))
+        return Picture(
+            robot=robot,
+            scenario=scenario,
+            time=count * scenario.conditions.control_period,
+            body=Posture(robot.link_centres(theta, position), theta),
+            reference=Posture(robot.link_centres(wanted, here), wanted),
+            thrust=np.nan_to_num(simulation.force[index]) / simulation.limit[index],
+            current=simulation.current[index],
+            path=self._path,
+            instants=instants,
+            errors=np.clip(self._errors[instants], -FAR, FAR),
+            max_error=simulation.max_error[index].copy(),
+            lost=bool(simulation.lost[index]),
+        )
+
+
+def reference_angles(simulation: Simulation, index: int) -> Array:
+    """Link angles with the reference joint angles whose heading is the reference's, (links,)."""
+    layout = simulation.layout
+    observed = simulation.observation[index] * layout.scale
+    joints = observed[layout.slices["joint_references"]]
+    # phi_i = theta_i - theta_(i+1)
+    shape = -np.concatenate([[0.0], np.cumsum(joints)])
+    by_head = simulation.scenarios[index].heading == "head"
+    theta = np.nan_to_num(simulation.theta[index])
+    heading, own = (theta[-1], shape[-1]) if by_head else (theta.mean(), shape.mean())
+    return np.asarray(shape - own + heading - simulation.heading_error[index])

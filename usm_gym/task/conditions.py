@@ -1,0 +1,123 @@
+"""Under what an episode takes place: sensors, actuators, timing, ranges of the water; presets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter
+
+from usm_gym.robot import Hydrodynamics
+from usm_gym.support.validation import Number, Switch, build, require, validated
+
+# No water that a robot swims in moves faster, m/s.
+LARGEST_CURRENT = 5.0
+# What a control period costs at most, which nothing can interrupt.
+MOST_SUBSTEPS = 10_000
+
+Coefficient = Annotated[Number, Field(ge=0.01, le=100)]
+Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
+FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
+
+
+@validated
+class Conditions:
+    """Sensors, actuators, timing, and the ranges from which water and joint motion are drawn.
+
+    The defaults are the preset "field".
+
+    Attributes:
+        control_period: Time between two actions, 1e-6 to 1 s; up to 10000 physics steps.
+        physics_step: Step of the integration, 1e-6 to 0.1 s.
+        integrator: "symplectic" treats drag and joint controllers implicitly; "explicit" is Euler's
+            forward method, stable with the default joint gains only below about 1e-4 s.
+        hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
+        thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
+        thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
+        position_noise: Standard deviation of the position measurement in each axis, 0 to 1 m.
+        current_limit: Largest constant current in each axis, 0 to 5 m/s.
+        current_variation: Largest amplitude of a sinusoidal current on top of it, 0 to 5 m/s.
+        coefficient_range: True hydrodynamic coefficients over the nominal ones, 0.01 to 100.
+        deflection_range: Size of the head deflections, 0.001 to 20 rad.
+        filter_range: Natural frequency of the joint references' filter, 0.01 to 1000 rad/s.
+        motion: False keeps the joints still.
+    """
+
+    control_period: Annotated[Number, Field(ge=1e-6, le=1)] = 0.02
+    physics_step: Annotated[Number, Field(ge=1e-6, le=0.1)] = 1e-3
+    integrator: Literal["symplectic", "explicit"] = "symplectic"
+    hydrodynamics: Hydrodynamics = "consistent"
+    thruster_time_constant: Annotated[Number, Field(ge=0, le=100)] = 0.05
+    thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0
+    position_noise: Annotated[Number, Field(ge=0, le=1)] = 5e-5
+    current_limit: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.05
+    current_variation: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.0
+    coefficient_range: tuple[Coefficient, Coefficient] = (0.8, 1.2)
+    deflection_range: tuple[Deflection, Deflection] = (0.7, 1.75)
+    filter_range: tuple[FilterFrequency, FilterFrequency] = (6.0, 12.0)
+    motion: Switch = True
+
+    def __post_init__(self) -> None:
+        """Refuse a control period that is no multiple of the step, and ranges that are none."""
+        multiple = self.control_period / self.physics_step
+        require(
+            1 <= round(multiple) <= MOST_SUBSTEPS
+            and math.isclose(multiple, round(multiple), rel_tol=1e-9),
+            "control_period",
+            self.control_period,
+            f"1 to {MOST_SUBSTEPS} times physics_step = {self.physics_step}",
+        )
+        for name in ("coefficient_range", "deflection_range", "filter_range"):
+            low, high = getattr(self, name)
+            require(low <= high, name, (low, high), "low <= high")
+
+    @property
+    def timing(self) -> tuple[float, float, str, str]:
+        """What robots that are simulated side by side have to agree in."""
+        return self.control_period, self.physics_step, self.integrator, self.hydrodynamics
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in a control period."""
+        return round(self.control_period / self.physics_step)
+
+
+FIELD = Conditions()
+PRESETS: dict[str, Conditions] = {
+    "ideal": Conditions(
+        thruster_time_constant=0.0,
+        thruster_limit=100.0,
+        position_noise=0.0,
+        current_limit=0.0,
+        coefficient_range=(1.0, 1.0),
+    ),
+    "field": FIELD,
+    "rough": Conditions(
+        thruster_time_constant=0.1,
+        thruster_limit=15.0,
+        position_noise=2e-4,
+        current_limit=0.1,
+        current_variation=0.05,
+        coefficient_range=(0.6, 1.5),
+        deflection_range=(0.9, 2.1),
+        filter_range=(8.0, 14.0),
+    ),
+}
+
+
+def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
+    """Give the conditions of a preset's name, or of fields that differ from the preset "field".
+
+    Raises:
+        ValueError: If the name or a field is unknown, or a value not allowed.
+    """
+    if isinstance(value, Conditions):
+        return value
+    if isinstance(value, str):
+        require(value in PRESETS, "conditions", value, ", ".join(PRESETS))
+        return PRESETS[value]
+    return build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
+
+
+_ADAPTER = TypeAdapter(Conditions)

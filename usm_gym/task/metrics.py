@@ -1,0 +1,100 @@
+"""The score of an episode: Table 1 of the paper and what is shown beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from usm_gym.support.validation import real_array, require
+
+# Controllers are given this long after each change of the joint references, s.
+RECOVERY = 7.0
+# Further from its reference than this in either axis a robot is lost, and counts at least this, m.
+LOST_ERROR = 0.5
+TIME_TOLERANCE = 1e-9
+
+
+def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
+    """Largest absolute position error after settling, per axis: Table 1 of the paper.
+
+    Args:
+        time: Times, s, shape (samples,).
+        error: True position errors, m, shape (samples, 2).
+        settle_time: From when on errors count, s.
+
+    Returns:
+        Largest |error| in x and y over time >= settle_time, m, shape (2,).
+
+    Raises:
+        ValueError: If shapes do not match, a value is not finite or no sample is late enough.
+    """
+    _, errors, late = _checked(time, error, settle_time)
+    return np.asarray(np.abs(errors[late]).max(axis=0))
+
+
+def settled_error(
+    time: ArrayLike, error: ArrayLike, shifts: Sequence[float], settle_time: float = 5.0
+) -> NDArray[np.float64]:
+    """The same maximum, leaving out the 7 s after each change of the joint references.
+
+    Args:
+        time: Times, s, shape (samples,).
+        error: True position errors, m, shape (samples, 2).
+        shifts: When the joint references change, s.
+        settle_time: From when on errors count, s.
+
+    Returns:
+        Largest |error| in x and y, m, shape (2,).
+    """
+    times, errors, late = _checked(time, error, settle_time)
+    for shift in shifts:
+        late &= (times < shift) | (times >= shift + RECOVERY)
+    require(late.any(), "shifts", shifts, f"some of the time up to {times[-1]} s left")
+    return np.asarray(np.abs(errors[late]).max(axis=0))
+
+
+def rms_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
+    """Root mean square of the position error after settling, per axis, m, shape (2,)."""
+    _, errors, late = _checked(time, error, settle_time)
+    return np.asarray(np.sqrt(np.mean(errors[late] ** 2, axis=0)))
+
+
+def thrust_effort(command: ArrayLike) -> float:
+    """Mean absolute thruster command over thrusters and time, N; command: (samples, thrusters)."""
+    return float(np.mean(np.abs(command)))
+
+
+def thrust_variation(command: ArrayLike, control_period: float) -> float:
+    """How much the commands chatter: sum of |change| per second, mean over the thrusters, N/s.
+
+    Args:
+        command: Thruster commands after saturation, N, shape (samples, thrusters).
+        control_period: Time between samples, s.
+    """
+    commands = np.asarray(command, np.float64)
+    duration = len(commands) * control_period
+    return float(np.abs(np.diff(commands, axis=0)).sum(axis=0).mean() / duration)
+
+
+def saturation_share(command: ArrayLike, limit: float) -> float:
+    """Share of commands that are at the thruster limit; command: N, (samples, thrusters)."""
+    return float(np.mean(np.abs(command) >= limit))
+
+
+def _checked(
+    time: ArrayLike, error: ArrayLike, settle_time: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    times = real_array("time", time).astype(np.float64)
+    errors = real_array("error", error).astype(np.float64)
+    settled = real_array("settle_time", settle_time)
+    require(settled.ndim == 0, "settle_time", settle_time, "a number, s")
+    require(times.ndim == 1, "time", times.shape, "one dimension")
+    require(errors.shape == (times.size, 2), "error", errors.shape, f"shape ({times.size}, 2)")
+    require(np.isfinite(times).all(), "time", "not finite", "finite numbers")
+    require(np.isfinite(errors).all(), "error", "not finite", "finite numbers")
+    # Sample times are multiples of a period and may fall short of a decimal by rounding.
+    late = times >= settle_time - TIME_TOLERANCE
+    require(late.any(), "settle_time", settle_time, "a time before the last sample")
+    return times, errors, late

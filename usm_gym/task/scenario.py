@@ -1,0 +1,338 @@
+"""What happens in an episode: path, joint motion, conditions, water; sampling and JSON.
+
+All of it is plain data. A `Scenario` fixes an episode completely, sensor noise included, and is the
+same in JSON (`to_dict`, `from_dict`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+from pydantic import Field, Strict, TypeAdapter
+
+from usm_gym.plant.layout import MAX_SHIFTS
+from usm_gym.plant.motion import path_positions
+from usm_gym.robot import Damping, Stiffness
+from usm_gym.support.validation import Count, Number, Switch, build, require, validated
+from usm_gym.task.conditions import (
+    FIELD,
+    LARGEST_CURRENT,
+    PRESETS,
+    Coefficient,
+    Conditions,
+    FilterFrequency,
+)
+
+Mode = Literal["operation", "torpedo"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+# The longest episode: 1000 s at the paper's step of 1e-5 s.
+MOST_PHYSICS_STEPS = 100_000_000
+
+Time = Annotated[Number, Field(ge=0, le=3600)]
+Velocity = Annotated[Number, Field(ge=-LARGEST_CURRENT, le=LARGEST_CURRENT)]
+Phase = Annotated[Number, Field(ge=-100, le=100)]
+
+# Spawn keys of the streams that a noise seed opens.
+NOISE, WATER = range(2)
+
+
+@validated
+class Path:
+    """The path of the centre of mass, p_ref = (speed s, amplitude sin(frequency s)).
+
+    Attributes:
+        speed: v, -10 to 10 m/s.
+        amplitude: A, -100 to 100 m.
+        frequency: Angular frequency, -100 to 100 rad/s.
+        ramp: Time over which path time s starts from rest, 0 (at full speed) to 3600 s.
+    """
+
+    speed: Annotated[Number, Field(ge=-10, le=10)] = 0.042
+    amplitude: Annotated[Number, Field(ge=-100, le=100)] = 0.18
+    frequency: Annotated[Number, Field(ge=-100, le=100)] = 0.065
+    ramp: Time = 2.0
+
+
+@validated
+class Inspection:
+    """The joint motion: the head side of the body bends one way, the other way, and back.
+
+    A head deflection d is the reference d / bending_joints on each of the last joints, and turns
+    the head to -d.
+
+    Attributes:
+        bending_joints: How many joints bend, counted from the head, 1 to 255.
+        times: When the deflection changes, up to 8 rising times, 0 to 3600 s.
+        deflections: To what it changes at those times, -100 to 100 rad.
+        filter_frequency: Natural frequency of the critically damped second-order filter between
+            those steps and the joint references, 0.01 to 1000 rad/s; None leaves them steps.
+    """
+
+    bending_joints: Annotated[Count, Field(le=255)] = 11
+    times: Annotated[tuple[Time, ...], Field(max_length=MAX_SHIFTS)] = (10.0, 20.0, 30.0)
+    deflections: tuple[Annotated[Number, Field(ge=-100, le=100)], ...] = (0.98, -0.98, 0.0)
+    filter_frequency: FilterFrequency | None = 8.0
+
+    def __post_init__(self) -> None:
+        """Refuse times that do not rise or do not match the deflections."""
+        require(
+            len(self.times) == len(self.deflections),
+            "deflections",
+            self.deflections,
+            "as many as times",
+        )
+        rising = all(a < b for a, b in zip(self.times, self.times[1:], strict=False))
+        require(rising, "times", self.times, "rising times")
+
+
+STILL = Inspection(bending_joints=1, times=(), deflections=())
+
+
+@validated
+class Water:
+    """The water of one episode, which no controller is told.
+
+    Attributes:
+        current: Constant part of the water's velocity, global frame, -5 to 5 m/s.
+        amplitude: Amplitude of its sinusoidal part in each axis, -5 to 5 m/s.
+        phase: Phase of that part at the start, -100 to 100 rad.
+        period: Period of that part, 0.1 to 1e6 s.
+        coefficients: True over nominal value of (c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the
+            same for all links, 0.01 to 100.
+    """
+
+    current: tuple[Velocity, Velocity] = (0.0, 0.0)
+    amplitude: tuple[Velocity, Velocity] = (0.0, 0.0)
+    phase: tuple[Phase, Phase] = (0.0, 0.0)
+    period: Annotated[Number, Field(ge=0.1, le=1e6)] = 20.0
+    coefficients: tuple[
+        Coefficient, Coefficient, Coefficient, Coefficient, Coefficient, Coefficient
+    ] = (1.0,) * 6
+
+
+@validated
+class Scenario:
+    """One episode, complete.
+
+    Attributes:
+        mode: "operation" or "torpedo".
+        path: Path of the centre of mass.
+        inspection: Joint motion.
+        conditions: Sensors, actuators, timing.
+        water: The water of this episode.
+        duration: Length of the episode, 1e-6 to 3600 s; a multiple of the control period, and
+            100 million physics steps at most.
+        settle_time: From when on errors count, 0 to 3600 s.
+        noise_seed: Seed of the sensor noise, 0 to 2^64 - 1.
+        joint_stiffness: Joint controllers' proportional gain, 0 to 1e6 N m/rad; None: the robot's.
+        joint_damping: Joint controllers' derivative gain, 0 to 1e6 N m s/rad; None: the robot's.
+        heading: Whether heading means the mean link angle or the head link's.
+        look_ahead: Look-ahead distance of the line-of-sight guidance, 0.01 to 1000 m; None: heading
+            reference 0.
+        cross_track: Whether that guidance aims at the path, rather than at the x axis as the paper
+            prints it.
+    """
+
+    mode: Mode = "operation"
+    path: Path = Path()
+    inspection: Inspection = Inspection()
+    conditions: Conditions = FIELD
+    water: Water = Water()
+    duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0
+    settle_time: Time = 5.0
+    noise_seed: Annotated[int, Strict(), Field(ge=0, lt=2**64)] = 0
+    joint_stiffness: Stiffness | None = None
+    joint_damping: Damping | None = None
+    heading: Literal["mean", "head"] = "mean"
+    look_ahead: Annotated[Number, Field(ge=0.01, le=1000)] | None = None
+    cross_track: Switch = False
+
+    def __post_init__(self) -> None:
+        """Refuse a duration of no whole number of control periods, or of too many steps."""
+        steps = self.duration / self.conditions.control_period
+        require(
+            round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),
+            "duration",
+            self.duration,
+            f"a multiple of control_period = {self.conditions.control_period}",
+        )
+        longest = MOST_PHYSICS_STEPS * self.conditions.physics_step
+        require(
+            self.duration <= longest,
+            "duration",
+            self.duration,
+            f"up to {longest:g} s, {MOST_PHYSICS_STEPS} physics steps",
+        )
+
+    @property
+    def steps(self) -> int:
+        """Control periods in the episode."""
+        return round(self.duration / self.conditions.control_period)
+
+    @property
+    def shifts(self) -> tuple[float, ...]:
+        """When the joint references change, s; empty if the joints keep still."""
+        return self.inspection.times if self.conditions.motion else ()
+
+    def noise(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Measurement error of the position at every control instant, m, shape (steps + 1, 2)."""
+        stream = np.random.default_rng(np.random.SeedSequence(self.noise_seed, spawn_key=(NOISE,)))
+        return self.conditions.position_noise * stream.standard_normal((self.steps + 1, 2))
+
+    def reference_positions(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Reference of the position at every control instant, m, shape (steps + 1, 2)."""
+        conditions, path = self.conditions, self.path
+        instants = np.arange(self.steps + 1) * conditions.substeps
+        positions = np.empty((self.steps + 1, 2))
+        path_positions(
+            instants * conditions.physics_step,
+            path.speed,
+            path.amplitude,
+            path.frequency,
+            path.ramp,
+            positions,
+        )
+        return positions
+
+    def under(self, conditions: Conditions) -> Scenario:
+        """The same episode under other conditions, its water redrawn from the same noise seed."""
+        water = draw_water(conditions, self.noise_seed)
+        return dataclasses.replace(self, conditions=conditions, water=water)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scenario in JSON's types."""
+        data: dict[str, Any] = _ADAPTER.dump_python(self, mode="json")
+        return data
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> Scenario:
+        """Read what `to_dict` wrote; fields left out have their defaults.
+
+        Raises:
+            ValueError: If a key is unknown, or a value of the wrong type or out of range.
+        """
+        return build(_ADAPTER, "scenario", data)
+
+
+_ADAPTER = TypeAdapter(Scenario)
+
+
+def draw_water(conditions: Conditions, noise_seed: int) -> Water:
+    """Draw the water of an episode.
+
+    Every number comes from the same place of the same stream whatever the conditions, so that
+    a change of conditions stretches an episode's water rather than replace it.
+    """
+    stream = np.random.default_rng(np.random.SeedSequence(noise_seed, spawn_key=(WATER,)))
+    unit = stream.uniform(-1.0, 1.0, 4)
+    phase = stream.uniform(0.0, 2 * math.pi, 2)
+    period = stream.uniform(10.0, 40.0)
+    low, high = conditions.coefficient_range
+    coefficients = low + (high - low) * stream.random(6)
+    return Water(
+        current=_pair(conditions.current_limit * unit[:2]),
+        amplitude=_pair(conditions.current_variation * unit[2:]),
+        phase=_pair(phase),
+        period=period,
+        coefficients=tuple(coefficients.tolist()),
+    )
+
+
+def mode_of(value: Any) -> Mode:
+    """The mode of a name.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
+    mode: Mode = value
+    return mode
+
+
+def sample(
+    mode: Mode, conditions: Conditions, stream: np.random.Generator, joints: int = 15
+) -> Scenario:
+    """Draw a scenario of a mode (ranges: docs/model.md section 9).
+
+    Args:
+        mode: "operation" or "torpedo".
+        conditions: Conditions, whose ranges are used.
+        stream: Where all randomness comes from.
+        joints: Number of joints of the robot; a third to eleven fifteenths of them bend.
+    """
+    if mode_of(mode) == "torpedo":
+        path = Path(
+            speed=stream.uniform(0.05, 0.3),
+            amplitude=stream.uniform(0.0, 0.5),
+            frequency=stream.uniform(0.03, 0.12),
+        )
+        inspection = STILL
+    else:
+        path = Path(
+            speed=stream.uniform(0.0, 0.1),
+            amplitude=stream.uniform(0.0, 0.25),
+            frequency=stream.uniform(0.03, 0.15),
+        )
+        bending_joints = int(stream.integers(max(1, joints // 3), max(1, 11 * joints // 15) + 1))
+        side = 1.0 if stream.random() < 0.5 else -1.0
+        first, second = stream.uniform(*conditions.deflection_range, 2)
+        third = stream.uniform(-0.35, 0.35)
+        times = np.array([10.0, 20.0, 30.0]) + stream.uniform(-2.0, 2.0, 3)
+        inspection = Inspection(
+            bending_joints=bending_joints,
+            times=tuple(times.tolist()),
+            deflections=(side * first, -side * second, third),
+            filter_frequency=stream.uniform(*conditions.filter_range),
+        )
+    noise_seed = int(stream.integers(2**63))
+    return dataclasses.replace(
+        named("nominal", mode, conditions),
+        path=path,
+        inspection=inspection,
+        water=draw_water(conditions, noise_seed),
+        noise_seed=noise_seed,
+    )
+
+
+def named(
+    name: str, mode: Mode, conditions: Conditions | None = None, joints: int = 15
+) -> Scenario:
+    """The scenario "nominal" or "table1" of a mode (docs/model.md section 9).
+
+    Args:
+        name: "nominal", or "table1", the scenario of the paper's Table 1.
+        mode: "operation" or "torpedo".
+        conditions: Its conditions; without them "field" for nominal and "ideal" for table1.
+        joints: Number of joints of the robot; eleven fifteenths of them bend.
+    """
+    require(name in ("nominal", "table1"), "scenario", name, "nominal, table1")
+    torpedo = mode == "torpedo"
+    bending_joints = max(1, 11 * joints // 15)
+    if name == "nominal":
+        return Scenario(
+            mode=mode,
+            path=Path(speed=0.1) if torpedo else Path(),
+            inspection=STILL if torpedo else Inspection(bending_joints=bending_joints),
+            conditions=conditions or FIELD,
+            look_ahead=2.24 if torpedo else None,
+        )
+    return Scenario(
+        mode=mode,
+        path=Path(ramp=0.0),
+        inspection=STILL
+        if torpedo
+        else Inspection(bending_joints=bending_joints, filter_frequency=None),
+        conditions=conditions or PRESETS["ideal"],
+        joint_stiffness=9000.0,
+        joint_damping=150.0,
+        look_ahead=2.24 if torpedo else None,
+    )
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    x, y = values.tolist()
+    return x, y
