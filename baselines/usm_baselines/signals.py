@@ -37,6 +37,7 @@ class Model(NamedTuple):
     Attributes:
         starts: First index of each entry of the observation.
         scale: Physical value over observed value of each number.
+        axes: Number of axes in which the position is controlled.
         links: Number of links.
         l: Half the length of a link, m.
         thruster_links: Zero-based link of each thruster.
@@ -47,6 +48,7 @@ class Model(NamedTuple):
 
     starts: NDArray[np.int64]
     scale: Array
+    axes: int
     links: int
     l: float
     thruster_links: NDArray[np.int64]
@@ -84,6 +86,7 @@ def model_of(nominal: Nominal) -> Model:
     return Model(
         starts=layout.starts,
         scale=layout.scale,
+        axes=2,
         links=robot.links,
         l=robot.half_length,
         thruster_links=robot.thruster_links,

@@ -15,7 +15,7 @@ import usm_gym
 from usm_cli.program import main
 from usm_cli.report import chapters, page, plots
 from usm_cli.report.replay import packed
-from usm_gym.rendering.canvas import canvas as rendering
+from usm_gym.rendering import canvas as rendering
 from usm_gym.support.provenance import provenance
 
 ROOT = Path(__file__).parents[2]

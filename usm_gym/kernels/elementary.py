@@ -3,7 +3,7 @@
 A machine's mathematical library may answer differently from the next one's in the last bit, and a
 vectorised loop differently from a scalar one. These functions use only additions, multiplications
 and divisions, which IEEE 754 fixes. Each is within one unit in the last place of the exact value
-(`tests/plant/test_elementary.py`).
+(`tests/usm_gym/kernels/test_elementary.py`).
 """
 
 from __future__ import annotations

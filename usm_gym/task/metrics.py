@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,8 @@ RECOVERY = 7.0
 # Further from its reference than this in either axis a robot is lost, and counts at least this, m.
 LOST_ERROR = 0.5
 TIME_TOLERANCE = 1e-9
+# Begins the names of the metric of Table 1 in each axis.
+MAX_ERROR = "max_error_"
 
 
 def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
@@ -81,6 +84,20 @@ def thrust_variation(command: ArrayLike, control_period: float) -> float:
 def saturation_share(command: ArrayLike, limit: float) -> float:
     """Share of commands that are at the thruster limit; command: N, (samples, thrusters)."""
     return float(np.mean(np.abs(command) >= limit))
+
+
+def axes_of(names: Iterable[str]) -> tuple[str, ...]:
+    """The axes of scores, from the names of their columns `max_error_AXIS`, in order."""
+    return tuple(name.removeprefix(MAX_ERROR) for name in names if name.startswith(MAX_ERROR))
+
+
+def total_error(scores: Mapping[str, Any]) -> Any:
+    """What policies are ranked by: the largest errors of all axes, added up, m; less is better.
+
+    Args:
+        scores: Numbers or arrays by the names of metrics, `max_error_AXIS` among them.
+    """
+    return sum(scores[MAX_ERROR + axis] for axis in axes_of(scores))
 
 
 def _checked(

@@ -4,16 +4,16 @@ import subprocess
 import sys
 
 import pytest
-from agents.artifact import DESCRIPTION, PRETRAINED, read_agent
-from agents.selection import unseen
+import usm_agents  # noqa: F401 (registers them)
 from baselines.leaderboard import total
+from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
 from usm_gym.conditions import Conditions
 from usm_gym.nominal import nominal_of
 
-import agents  # noqa: F401 (registers them)
 import baselines
 import usm_gym
 from usm_gym.robot import Robot
+from usm_gym.suites import unseen
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
@@ -36,7 +36,7 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
 
 def test_scoring_a_shipped_agent_does_not_import_torch():
     code = """
-import sys, agents, baselines, usm_gym
+import sys, usm_agents, usm_baselines, usm_gym
 from usm_gym.nominal import nominal_of
 suite = usm_gym.suite("operation")[:1]
 usm_gym.evaluate(baselines.make("residual-ppo", nominal_of(usm_gym.Robot(), suite[0])), suite)

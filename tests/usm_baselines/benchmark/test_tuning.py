@@ -111,7 +111,8 @@ def test_another_problem_never_continues_a_study(monkeypatch: pytest.MonkeyPatch
 def test_tuning_cannot_reach_a_frozen_suite() -> None:
     # By imports: not even indirectly. By draws: no scenario, no noise seed in common.
     code = (
-        "import grimp; graph = grimp.build_graph('usm_agents', 'usm_baselines', 'usm_gym');"
+        "import grimp;"
+        "graph = grimp.build_graph('usm_cli', 'usm_agents', 'usm_baselines', 'usm_gym');"
         "found = {m for m in graph.find_upstream_modules('usm_baselines.benchmark.tuning')"
         " | graph.find_upstream_modules('usm_cli.commands.tune') if 'suites' in m};"
         "print(sorted(found))"

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from plant.swimming import State, random_state, relative_difference, swimmer
 from support import oracle
+from support.swimming import State, random_state, relative_difference, swimmer
 
 import usm_gym
 from usm_gym import Robot, Thruster

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from plant.swimming import Motion, random_state, swim, swimmer, without_drag
 from support import oracle
+from support.swimming import Motion, random_state, swim, swimmer, without_drag
 
 from usm_gym import Robot
 

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from plant import dense_step
-from plant.dense_step import Moment
-from plant.swimming import swimmer
 from scipy.integrate import solve_ivp
+from support import dense_step
+from support.dense_step import Moment
+from support.swimming import swimmer
 
 import usm_gym
 from usm_gym import Conditions, Inspection, Robot, Scenario, Water

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from plant.swimming import State, random_state, relative_difference, swim, swimmer
+from support.swimming import State, random_state, relative_difference, swim, swimmer
 
 import usm_gym
 from usm_gym import Robot

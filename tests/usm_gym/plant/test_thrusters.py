@@ -4,8 +4,8 @@ import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from plant.swimming import swimmer
 from support import oracle
+from support.swimming import swimmer
 
 from usm_gym import Robot, Thruster
 from usm_gym.plant import thrusters

@@ -14,8 +14,8 @@ import pytest
 import usm_baselines
 
 import usm_gym
+from usm_gym.rendering import canvas as rendering
 from usm_gym.rendering.canvas import HEAD, JET_CORE, REFERENCE, SCENE, TAIL, TRAIL, Canvas
-from usm_gym.rendering.canvas import canvas as rendering
 from usm_gym.rendering.picture import Recorder
 from usm_gym.rendering.window import Window, _windows
 
