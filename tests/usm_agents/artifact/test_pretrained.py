@@ -5,27 +5,28 @@ import sys
 
 import pytest
 import usm_agents  # noqa: F401 (registers them)
-from baselines.leaderboard import total
+import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
-from usm_gym.conditions import Conditions
-from usm_gym.nominal import nominal_of
+from usm_baselines.benchmark.leaderboard import total
 
-import baselines
 import usm_gym
 from usm_gym.robot import Robot
 from usm_gym.suites import unseen
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.nominal import nominal_of
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
 def test_a_shipped_agent_beats_its_base_as_it_says(folder):
-    assert folder.name in baselines.ids()
+    assert folder.name in usm_baselines.ids()
     agent, _ = read_agent(folder)
     scenarios = unseen(agent.mode, Conditions(**agent.conditions), seed=11, episodes=16)
     nominal = nominal_of(Robot(), scenarios[0])
     ours, base = (
-        usm_gym.evaluate(baselines.make(id, nominal), scenarios) for id in (folder.name, agent.base)
+        usm_gym.evaluate(usm_baselines.make(id, nominal), scenarios)
+        for id in (folder.name, agent.base)
     )
     assert not ours.failed.any()
     assert total(ours).mean() < total(base).mean()
@@ -37,9 +38,9 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
 def test_scoring_a_shipped_agent_does_not_import_torch():
     code = """
 import sys, usm_agents, usm_baselines, usm_gym
-from usm_gym.nominal import nominal_of
+from usm_gym.task.nominal import nominal_of
 suite = usm_gym.suite("operation")[:1]
-usm_gym.evaluate(baselines.make("residual-ppo", nominal_of(usm_gym.Robot(), suite[0])), suite)
+usm_gym.evaluate(usm_baselines.make("residual-ppo", nominal_of(usm_gym.Robot(), suite[0])), suite)
 sys.exit("torch" in sys.modules)
 """
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
