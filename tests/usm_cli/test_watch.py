@@ -59,6 +59,7 @@ def probe(path):
     return about, frames
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("suffix", "policies", "speed", "size", "fps", "frames"),
     [

@@ -39,6 +39,7 @@ def errors(curve):
     return [(point["steps"], point["max_error_x"], point["max_error_y"]) for point in curve]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["ppo", "recurrent-ppo"])
 def test_a_training_that_is_stopped_goes_on_to_the_bit(algorithm, tmp_path):
     robots = training.ROBOTS[algorithm]
@@ -146,6 +147,7 @@ def test_the_log_has_the_metric_on_held_out_scenarios(tmp_path):
     assert logged == [(each["steps"], np.float32(each["max_error_x"])) for each in curve]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
 def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeypatch):
     settings = algorithms.SETTINGS[algorithm]

@@ -21,6 +21,7 @@ def test_short_runs_are_the_same_bits_side_by_side_and_alone():
             assert (a == b).all()
 
 
+@pytest.mark.slow
 def test_the_tables_of_the_paper_in_half_a_minute():
     """The bounds that the reproduction has to keep, from the one declared scenario."""
     chosen = cases()
