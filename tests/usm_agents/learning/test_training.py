@@ -1,8 +1,6 @@
 """Training: goes on after an interruption to the bit, says when it diverges, leaves an agent."""
 
 import pickle
-import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium as gym
@@ -221,11 +219,10 @@ def test_bad_plans_are_refused(fields, message):
         (["--conditions", "stormy"], "conditions is 'stormy'"),
     ],
 )
-def test_the_command_refuses_in_one_line(options, message, tmp_path):
-    code = "import sys; from usm_cli.program import main; main(sys.argv[1:])"
-    command = [sys.executable, "-c", code, "train", "--output", str(tmp_path / "new"), *options]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert answer.returncode == 2
-    assert answer.stderr.count("\n") == 1
-    assert message in answer.stderr
+def test_the_command_refuses_in_one_line(options, message, tmp_path, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["train", "--output", str(tmp_path / "new"), *options])
+    answer = capsys.readouterr().err
+    assert answer.count("\n") == 1
+    assert message in answer
     assert not (tmp_path / "new").exists()

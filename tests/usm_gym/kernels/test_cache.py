@@ -197,6 +197,7 @@ pwd.getpwuid, tempfile.gettempdir = nobody, nowhere
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="users without a home are of POSIX")
 @pytest.mark.parametrize("given", [True, False])
 def test_a_user_without_home_or_temporary_folder_needs_neither(given, tmp_path):
