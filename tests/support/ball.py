@@ -32,7 +32,7 @@ class Shared(NamedTuple):
 def observe(fleet, shared, table, k, lanes):
     row, lane, seen = fleet.blocks[k // lanes], k % lanes, fleet.observation[k]
     t, speed = row[CLOCK * lanes + lane] * shared.h, row[SPEED * lanes + lane]
-    noise = fleet.noise[k, fleet.instant[k]]
+    noise = fleet.noise[k, min(fleet.instant[k], fleet.noise.shape[1] - 1)]
     for axis in range(3):
         share = speed / (1.0 + axis)
         fleet.error[k, axis] = row[(P + axis) * lanes + lane] - share * t
@@ -43,8 +43,7 @@ def observe(fleet, shared, table, k, lanes):
         i, limit = table.starts[3] + axis, row[LIMIT * lanes + lane]
         seen[i] = row[(COMMAND + axis) * lanes + lane] / limit * table.gain[i]
     seen[table.starts[4]] = row[LIMIT * lanes + lane] * table.gain[table.starts[4]]
-    for i in range(seen.size):
-        seen[i] = min(max(seen[i], -table.bound[i]), table.bound[i])
+    seen[:] = np.minimum(np.maximum(seen, -table.bound), table.bound)
 
 
 @piece
