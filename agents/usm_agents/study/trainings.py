@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from usm_agents.artifact.folder import read_agent, write_agent
-from usm_agents.learning.checkpoint import CURVE, Point, traces
+from usm_agents.learning.checkpoint import CURVE, traces
 from usm_agents.learning.plan import Plan, read_plan
-from usm_agents.learning.training import VALIDATED, train
+from usm_agents.learning.training import train
+from usm_agents.learning.validation import Validation, is_validation
 from usm_agents.study.plans import AGENTS, PLANS, SEEDS
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json
@@ -57,25 +58,17 @@ class Run:
         return bool(self.curve[-1]["steps"] >= self.plan.steps)
 
     @property
-    def curve(self) -> list[Point]:
+    def curve(self) -> list[Validation]:
         """The learning curve, as far as it goes.
 
         Raises:
             ValueError: If the file holds none.
         """
         curve = read_json(self.folder / CURVE)
-        valid = isinstance(curve, list) and curve and all(map(is_point, curve))
+        valid = isinstance(curve, list) and curve and all(map(is_validation, curve))
         require(valid, f"file {self.folder / CURVE}", curve, "a learning curve")
-        known: list[Point] = curve
+        known: list[Validation] = curve
         return known
-
-
-def is_point(value: Any) -> bool:
-    """Whether a value is what a validation found."""
-    names = ("steps", "seconds", *VALIDATED, "failures")
-    return isinstance(value, dict) and all(
-        isinstance(value.get(name), (int, float)) for name in names
-    )
 
 
 def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = None) -> list[Run]:

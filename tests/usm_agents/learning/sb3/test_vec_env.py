@@ -10,7 +10,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
-from usm_agents.learning.sb3_vec_env import SB3VecEnv
+from usm_agents.learning.sb3.vec_env import SB3VecEnv
 
 import usm_gym
 
