@@ -19,7 +19,7 @@ from usm_gym.support.validation import require
 
 
 @dataclasses.dataclass(frozen=True)
-class Run:
+class StudyTraining:
     """One training of the study.
 
     Attributes:
@@ -71,7 +71,9 @@ class Run:
         return known
 
 
-def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = None) -> list[Run]:
+def runs(
+    names: Sequence[str], seeds: int, folder: Path, steps: int | None = None
+) -> list[StudyTraining]:
     """The trainings of the study, seed by seed, so that an early stop leaves some of each.
 
     Args:
@@ -90,11 +92,13 @@ def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = Non
             if seed >= SEEDS[name]:
                 continue
             plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
-            found.append(Run(name, plan, folder / "runs" / f"{name}-{seed}"))
+            found.append(StudyTraining(name, plan, folder / "runs" / f"{name}-{seed}"))
     return found
 
 
-def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], object]) -> None:
+def train_all(
+    chosen: Sequence[StudyTraining], workers: int, report: Callable[[StudyTraining], object]
+) -> None:
     """Train what is not trained yet; an interrupted training goes on where it was.
 
     Only a training of the very plan goes on: its checkpoint is code, which is run.
@@ -112,12 +116,12 @@ def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], objec
         report(waiting[index])
 
 
-def train_one(run: Run) -> None:
+def train_one(run: StudyTraining) -> None:
     """Carry out one training."""
     train(run.plan, run.folder, lambda steps, line: None, resume=run.begun)
 
 
-def ship(chosen: Sequence[Run], folder: Path, provenance: Mapping[str, Any]) -> None:
+def ship(chosen: Sequence[StudyTraining], folder: Path, provenance: Mapping[str, Any]) -> None:
     """Put each agent, as its seed 0, under its own name into a folder.
 
     Args:
