@@ -16,8 +16,6 @@ from usm_baselines.paper.paper_rate import simulate
 from usm_baselines.paper.reproduction import cases
 
 import usm_gym
-from usm_gym.robot import Robot
-from usm_gym.task.nominal import nominal_of
 
 FILE = Path(__file__).parents[1] / "data" / "scores.json"
 # By suite, the episode of it.
@@ -28,7 +26,7 @@ POLICIES = ("sta", "pd", "pid", "gsta-tuned", "lqg-joints-tuned", "mpc", "residu
 def scores(policy: str, suite: str) -> dict[str, float]:
     """Every metric of a policy in the episode of a suite."""
     scenario = usm_gym.suite(suite)[EPISODES[suite]]
-    made = usm_baselines.make(policy, nominal_of(Robot(), scenario))
+    made = usm_baselines.make(policy, scenario.nominal)
     metrics = usm_gym.evaluate(made, [scenario]).summary()["per_episode"]
     return {name: values[0] for name, values in metrics.items()}
 

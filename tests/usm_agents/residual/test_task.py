@@ -10,8 +10,6 @@ import usm_baselines
 from usm_agents.residual.task import Residual, ResidualPolicy
 
 import usm_gym
-from usm_gym.robot import Robot
-from usm_gym.task.nominal import nominal_of
 
 ID = "usm_agents:USM-OperationResidual-v0"
 
@@ -25,7 +23,7 @@ class Still:
 
 def test_a_zero_residual_scores_as_the_base():
     scenarios = usm_gym.suite("operation")[:3]
-    nominal = nominal_of(Robot(), scenarios[0])
+    nominal = scenarios[0].nominal
     ours = usm_gym.evaluate(ResidualPolicy(Residual(nominal), Still()), scenarios)
     base = usm_gym.evaluate(usm_baselines.make("sta", nominal), scenarios)
     for name, values in base.per_episode.items():
