@@ -55,7 +55,12 @@ class Linear(NamedTuple):
 
 
 def straight_body(robot: Robot) -> tuple[Array, Array]:
-    """Inertia (kg) and linear drag (N s/m) of the straight body along x and across it, (2,)."""
+    """Inertia (kg) and linear drag (N s/m) of the straight body along x and across it, (2,).
+
+    Raises:
+        ValueError: If the robot is not the planar one.
+    """
+    require(isinstance(robot, Robot), "robot", robot, "the planar robot")
     added = np.array([0.0, robot.added_mass])
     inertia = robot.total_mass + robot.links * added
     drag = robot.links * np.array([robot.tangential_drag, robot.normal_drag])
