@@ -1,9 +1,13 @@
-"""What importing the packages imports; import-linter checks the layers."""
+"""What importing the packages imports, and where tests stand; import-linter checks the layers."""
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+TESTS = Path(__file__).parent
+ROOTS = [TESTS.parent / name for name in ("", "baselines", "agents")]
 
 
 @pytest.mark.parametrize(
@@ -19,3 +23,9 @@ def test_importing_imports_nothing_heavy(packages: str, heavy: set[str]) -> None
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert not heavy & set(answer.stdout.split())
+
+
+@pytest.mark.parametrize("folder", sorted({file.parent for file in TESTS.glob("*/**/test_*.py")}))
+def test_a_folder_of_tests_has_the_name_of_what_it_tests(folder: Path) -> None:
+    name = folder.relative_to(TESTS)
+    assert any((root / name / "__init__.py").exists() for root in ROOTS)
