@@ -8,6 +8,7 @@ import pytest
 
 TESTS = Path(__file__).parent
 ROOTS = [TESTS.parent / name for name in ("", "baselines", "agents")]
+FOLDERS = sorted({file.parent.relative_to(TESTS) for file in TESTS.glob("*/**/test_*.py")})
 
 
 @pytest.mark.parametrize(
@@ -25,7 +26,6 @@ def test_importing_imports_nothing_heavy(packages: str, heavy: set[str]) -> None
     assert not heavy & set(answer.stdout.split())
 
 
-@pytest.mark.parametrize("folder", sorted({file.parent for file in TESTS.glob("*/**/test_*.py")}))
+@pytest.mark.parametrize("folder", FOLDERS, ids=str)
 def test_a_folder_of_tests_has_the_name_of_what_it_tests(folder: Path) -> None:
-    name = folder.relative_to(TESTS)
-    assert any((root / name / "__init__.py").exists() for root in ROOTS)
+    assert any((root / folder / "__init__.py").exists() for root in ROOTS)
