@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout
-from usm_gym.plant.chain import accelerate_all
-from usm_gym.plant.step import Plant
+from usm_gym.plant.chain import Plant, accelerate_all
 from usm_gym.robot import Hydrodynamics, Robot
 from usm_gym.support.validation import brief, real_array, require
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.plant import layout as rows
+from usm_gym.plant.chain import Plant
 from usm_gym.plant.joints import filter_coefficients
-from usm_gym.plant.step import Plant
 from usm_gym.plant.thrusters import lag_share
 from usm_gym.robot import Hydrodynamics, Robot
 

@@ -14,14 +14,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.elementary import sincos
 from usm_gym.kernels.lanes import WIDTH, block_at, load, spread, store
 from usm_gym.plant.layout import *
 
 
-class Body(NamedTuple):
-    """What all links of all robots share.
+class Plant(NamedTuple):
+    """What all robots of a fleet share.
 
     Attributes:
         l: Half the length of a link, m.
@@ -30,6 +33,13 @@ class Body(NamedTuple):
         implicit: Step over which drag and joint controllers are taken implicitly, s; 0 for not
             at all.
         kirchhoff: 1.0 for the consistent added mass, 0.0 for that of Kelasidi et al. (2014).
+        links: Number of links.
+        thruster_links: Zero-based link of each thruster, int64.
+        thruster_is_normal: Whether each thruster pushes across its link.
+        h: Physics step, s.
+        substeps: Physics steps in a control period.
+        shifts: Largest number of changes of the joint references in any episode.
+        moving_water: Whether the water's velocity changes in any episode.
     """
 
     l: float
@@ -37,6 +47,13 @@ class Body(NamedTuple):
     J: float
     implicit: float
     kirchhoff: float
+    links: int
+    thruster_links: NDArray[np.int64]
+    thruster_is_normal: NDArray[np.bool_]
+    h: float
+    substeps: int
+    shifts: int
+    moving_water: bool
 
 
 @piece
@@ -89,17 +106,17 @@ def fluid_force(v_t, v_n, omega, water_t, coefficients, kirchhoff):
 
 
 @piece
-def inertia(v_t, v_n, omega, coefficients, body):
+def inertia(v_t, v_n, omega, coefficients, plant):
     """Inertia of a link along, across and in yaw; implicit drag adds its step times its slope."""
     c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
-    along = body.m + body.implicit * (c_t * (1.0 + 2.0 * abs(v_t)))
-    across = body.m + mu + body.implicit * (c_n * (1.0 + 2.0 * abs(v_n)))
-    yaw = body.J + lambda_1 + body.implicit * (lambda_2 + 2.0 * lambda_3 * abs(omega))
+    along = plant.m + plant.implicit * (c_t * (1.0 + 2.0 * abs(v_t)))
+    across = plant.m + mu + plant.implicit * (c_n * (1.0 + 2.0 * abs(v_n)))
+    yaw = plant.J + lambda_1 + plant.implicit * (lambda_2 + 2.0 * lambda_3 * abs(omega))
     return along, across, yaw
 
 
 @piece
-def own_answers(block, like, wide, stride, links, base, body):
+def own_answers(block, like, wide, stride, links, base, plant):
     """Every link's own answer to an acceleration of its end towards the root (root: its centre).
 
     An answer is (a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y): to the angular acceleration `alpha`
@@ -126,10 +143,10 @@ def own_answers(block, like, wide, stride, links, base, body):
         v_t = c * u_x + s * u_y
         v_n = c * u_y - s * u_x
         water_t = c * water_x + s * water_y
-        f_t, f_n, moment = fluid_force(v_t, v_n, omega, water_t, coefficients, body.kirchhoff)
-        along, across, yaw = inertia(v_t, v_n, omega, coefficients, body)
+        f_t, f_n, moment = fluid_force(v_t, v_n, omega, water_t, coefficients, plant.kirchhoff)
+        along, across, yaw = inertia(v_t, v_n, omega, coefficients, plant)
         # The point is reach t from the centre, which moves with q - reach (alpha n - omega^2 t).
-        reach = body.l * load(block, row_of(SIDE, links) + i, wide)
+        reach = plant.l * load(block, row_of(SIDE, links) + i, wide)
         f_t += load(block, row_of(PUSH_T, links) + i, wide) - reach * ((omega * omega) * along)
         f_n += load(block, row_of(PUSH_N, links) + i, wide)
         lever = reach * across
@@ -288,7 +305,7 @@ def substitute(block, like, i, side, links, l, motion):
 
 
 @piece
-def accelerate(block, like, wide, stride, links, base, body):
+def accelerate(block, like, wide, stride, links, base, plant):
     """Fill in ALPHA of every link and the acceleration A_X, A_Y of the centre of mass.
 
     `base` is what `kinematics` has returned.
@@ -296,10 +313,10 @@ def accelerate(block, like, wide, stride, links, base, body):
     A neutrally buoyant robot does not notice that all the water accelerates: relative to the water
     nothing changes, so the water's acceleration is added to that of the centre of mass.
     """
-    l = body.l
+    l = plant.l
     root = links // 2
     last = links - 1
-    own_answers(block, like, wide, stride, links, base, body)
+    own_answers(block, like, wide, stride, links, base, plant)
     tail = (like, like, like, like, like, like, like, like, like)
     head = tail
     for i in range(last - root):
@@ -323,10 +340,10 @@ def accelerate(block, like, wide, stride, links, base, body):
 
 
 @compiled
-def accelerate_all(blocks, links, body):
+def accelerate_all(blocks, links, plant):
     """`accelerate` for blocks of one robot each."""
     wide = spread(0.0)
     for k in range(blocks.shape[0]):
         block = block_at(blocks, k, 0.0)
-        base = kinematics(block, 0.0, wide, WIDTH, links, body.l)
-        accelerate(block, 0.0, wide, WIDTH, links, base, body)
+        base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
+        accelerate(block, 0.0, wide, WIDTH, links, base, plant)

@@ -6,11 +6,6 @@ symplectic Euler with implicit drag and joints, and 0 for explicit Euler.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
 from usm_gym.kernels.compile import piece
 from usm_gym.kernels.elementary import sincos
 from usm_gym.kernels.lanes import load, store
@@ -18,34 +13,6 @@ from usm_gym.plant.chain import accelerate, kinematics
 from usm_gym.plant.joints import advance_references, joint_torques
 from usm_gym.plant.layout import *
 from usm_gym.plant.thrusters import push
-
-
-class Plant(NamedTuple):
-    """What all robots of a fleet share; with its first fields it serves as a `chain.Body`.
-
-    Attributes:
-        l, m, J, implicit, kirchhoff: As in `chain.Body`.
-        links: Number of links.
-        thruster_links: Zero-based link of each thruster, int64.
-        thruster_is_normal: Whether each thruster pushes across its link.
-        h: Physics step, s.
-        substeps: Physics steps in a control period.
-        shifts: Largest number of changes of the joint references in any episode.
-        moving_water: Whether the water's velocity changes in any episode.
-    """
-
-    l: float
-    m: float
-    J: float
-    implicit: float
-    kirchhoff: float
-    links: int
-    thruster_links: NDArray[np.int64]
-    thruster_is_normal: NDArray[np.bool_]
-    h: float
-    substeps: int
-    shifts: int
-    moving_water: bool
 
 
 @piece

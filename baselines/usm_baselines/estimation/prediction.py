@@ -19,8 +19,9 @@ from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.packing import body_row, plant_of
 from usm_gym.planar_world import PlanarWorld
+from usm_gym.plant.chain import Plant
 from usm_gym.plant.layout import *
-from usm_gym.plant.step import Plant, advance
+from usm_gym.plant.step import advance
 from usm_gym.robot import Robot
 from usm_gym.sensors import value
 from usm_gym.support.validation import require
