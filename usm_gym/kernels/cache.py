@@ -128,6 +128,8 @@ class _CacheFile(IndexDataCacheFile):
         try:
             index: dict[Any, str] = super()._load_index()
             return index
+        except (AttributeError, ImportError):
+            return {}  # of a version in which the type of an argument stood elsewhere
         except Exception as error:  # what is no pickle may raise anything
             _discard(self._index_path, error)
             return {}
@@ -152,6 +154,15 @@ class _Cache(FunctionCache):
             filename_base=self._impl.filename_base,
             source_stamp=self._impl.locator.get_source_stamp(),
         )
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        """Tell named tuples apart by their fields, too: kernels may not import their modules."""
+        return (*super()._index_key(sig, codegen), *map(_fields, sig))
+
+
+def _fields(kind: Any) -> tuple[Any, ...]:
+    """Names of the fields of an argument's type, and of the types within it."""
+    return (*getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
 
 
 def _discard(path: str, error: Exception) -> None:
