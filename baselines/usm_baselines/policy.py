@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from usm_baselines.signals import Array, Signals, act, model_of, room_for_signals, sense
+from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Gain, declared
+from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
 
 # The gain of the heading controller, which all laws share.
 HEADING_GAIN = Gain(100.0, "N m/rad", "heading gain k_psi", tuned=(30.0, 300.0))
@@ -59,12 +61,11 @@ class ScriptedPolicy:
             require(value > 0 or not gain.positive, name, value, "a number > 0")
         self.nominal = nominal
         self.gains = self.Gains(*map(float, chosen))
-        self._model = model_of(nominal)
-        self._thrusters = len(nominal.robot.thrusters)
+        self._world, self._model = world_of(nominal.robot), model_of(nominal)
         # Before the law's own numbers stand those that all laws share.
-        self._own = 1 + self._model.axes * self._thrusters
-        planar = self._model.axes == 2
-        require(planar or not self.planar, "axes", self._model.axes, "2, of the planar robot")
+        self._own = shared_size(self._model)
+        fitting = isinstance(nominal.robot, Robot) or not self.planar
+        require(fitting, "robot", nominal.robot, "the planar robot")
 
     @property
     def columns(self) -> dict[str, NDArray[np.int64]]:
@@ -129,13 +130,13 @@ class ScriptedPolicy:
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         size = len(observation)
-        signals = room_for_signals(observation, self._thrusters)
+        signals = signals_of(observation, self._model, self._world)
         sense(state, self._model, signals)
         own = state[:, self._own :].copy().reshape(size, *self.law_shape)
         force = np.empty_like(signals.y)
         self.control(signals, own, force)
         state[:, self._own :] = own.reshape(size, -1)
-        action = np.empty((size, self._thrusters), np.float32)
+        action = np.empty((size, self._model.thrusters), np.float32)
         gain = self.gains.heading_gain
         act(observation, state, self._model, signals.allocation, force, gain, action)
         return action

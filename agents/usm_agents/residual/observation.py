@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from usm_gym.sensors import Entry, Layout
 from usm_gym.support.validation import require
-from usm_gym.task.observation import Entry, Layout
 
 # How the agent sees the numbers of the base's state that its law declares as `shown`.
 BASE_ENTRIES = {

@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.kalman import COMMAND, DISTURBANCE, ERROR, RATE, THRUST
@@ -59,6 +58,8 @@ def regulator_gain(transition: Array, weight: float) -> Array:
         transition: Transition of the axis, (4, 6).
         weight: Error that is as bad as a change of u by 1 m/s^2, m s^2/m.
     """
+    from scipy.linalg import solve_discrete_are  # here, because it takes long to import
+
     rows, columns = [ERROR, RATE, THRUST], [ERROR, RATE, THRUST, COMMAND]
     A = np.zeros((4, 4))
     A[:3] = transition[np.ix_(rows, columns)]

@@ -86,7 +86,7 @@ class Oracle(ScriptedPolicy):
     def control(self, signals: Signals, state: Array, force: Array) -> None:
         """Run ahead with the commands held, and correct what comes of it."""
         copy: Any = self._copy
-        held = (copy.command / copy.limit[:, np.newaxis]).astype(np.float32)
+        held = (copy.read("command") / copy.limit[:, np.newaxis]).astype(np.float32)
         ahead = np.empty((self._periods, *force.shape, 1))
         for period in ahead:
             copy.step(held)
@@ -101,6 +101,6 @@ class Oracle(ScriptedPolicy):
             or copy.size != len(scenarios)
             or copy.scenarios[0].conditions.timing != timing
         ):
-            copy = Simulation(self.nominal.robot, scenarios)
+            copy = Simulation(scenarios)
         copy.restore(snapshot)
         return copy
