@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.kalman import COMMAND, DISTURBANCE, ERROR, RATE, STATES, THRUST
@@ -82,6 +81,8 @@ def regulator_gain(transition: Array, weight: float) -> Array:
         transition: Transition of the axis, (4, 6).
         weight: Error that is as bad as a change of u by 1 m/s^2, m s^2/m.
     """
+    from scipy.linalg import solve_discrete_are  # here, because it takes long to import
+
     rows, columns = [ERROR, RATE, THRUST], [ERROR, RATE, THRUST, COMMAND]
     A = np.zeros((4, 4))
     A[:3] = transition[np.ix_(rows, columns)]
@@ -138,7 +139,7 @@ def joint_lqg(signals, model, linear, gain, state, ahead, force):
         for axis in range(2):
             inertia, transition = linear.inertia[axis], linear.transition[axis]
             last, thrust = held_force(signals, model, b, axis) / inertia, 0.0
-            for j in range(model.thruster_links.size):
+            for j in range(model.thrusters):
                 thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
             own[ERROR], own[RATE] = state[b, 3 * axis], state[b, 3 * axis + 1]
             own[DISTURBANCE], own[THRUST] = 0.0, thrust / inertia
@@ -188,7 +189,7 @@ class JointLQG(LQG):
         """Compute the gains; gains other than the defaults by name, see `JointLQGGains`."""
         super().__init__(nominal, **gains)
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
-        self._predictor = Predictor(nominal, self._model, self._linear.correction)
+        self._predictor = Predictor(nominal, self._linear.correction)
 
     @property
     def law_shape(self) -> tuple[int, ...]:

@@ -34,6 +34,7 @@ def small(monkeypatch):
     monkeypatch.setattr(dissection, "EPISODES", 1)
 
 
+@pytest.mark.slow
 def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "study"
     command = ["study", "residual", "--only", "residual-ppo,reference", "--seeds", "1"]

@@ -92,6 +92,7 @@ def test_evaluate_policy_scores_a_scripted_policy():
     assert min(rewards) > -8000
 
 
+@pytest.mark.slow
 def test_ppo_trains_on_it():
     envs = vec_env(16)
     model = PPO("MlpPolicy", envs, n_steps=64, batch_size=256, n_epochs=2, seed=0, device="cpu")
@@ -100,6 +101,7 @@ def test_ppo_trains_on_it():
     assert np.isfinite(scores.per_episode["max_error_x"]).all()
 
 
+@pytest.mark.slow
 def test_a_model_with_its_environment_is_scored_by_several_workers():
     model = PPO("MlpPolicy", "usm_gym:USM-Operation-v0", device="cpu", seed=0)
     assert model.get_env().render_mode == "rgb_array"
