@@ -57,12 +57,8 @@ def accelerations(
             is unknown.
     """
     n = robot.links
-    require(
-        hydrodynamics in HYDRODYNAMICS,
-        "hydrodynamics",
-        hydrodynamics,
-        " or ".join(map(repr, HYDRODYNAMICS)),
-    )
+    allowed = " or ".join(map(repr, HYDRODYNAMICS))
+    require(hydrodynamics in HYDRODYNAMICS, "hydrodynamics", hydrodynamics, allowed)
     given = {
         "theta": _vectors("theta", theta, n),
         "theta_dot": _vectors("theta_dot", theta_dot, n),

@@ -171,7 +171,7 @@ def estimate(signals, mass, model, b, axis, state):
     """One period of the filter on what was measured of robot b and applied to it, in place.
 
     Args:
-        signals: `usm_baselines.laws.policy.Signals`.
+        signals: `usm_baselines.signals.Signals`.
         mass: Total mass m_t, kg.
         model: `Linear`.
         b: Which robot.

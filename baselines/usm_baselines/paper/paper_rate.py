@@ -122,12 +122,13 @@ def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None
 
 
 @piece
-def law_force(law, k, started, error, speed, rate, acceleration, start, force, h, mass, state):
+def law_force(law, k, started, error, speed, asked_for, force, h, mass, state):
     """One step of observer and law in one axis: the force on the centre of mass, N.
 
     Arguments in the axis: measured position error (m) and speed (m/s), the reference's rate (m/s)
-    and acceleration (m/s^2), p2(0) (m/s), the force of the last step (N).
+    and acceleration (m/s^2) with p2(0) (m/s), the force of the last step (N).
     """
+    rate, acceleration, start = asked_for
     if law.measured:
         z1, z2 = 0.0, 0.0
         state[0], state[1] = error, speed - rate
@@ -141,18 +142,39 @@ def law_force(law, k, started, error, speed, rate, acceleration, start, force, h
 
 
 @piece
-def saturate(T, limit, commands, f_x, f_y):
-    """Cut thruster commands (N) at the limit; the forces (N) that they then make."""
+def saturate(T, limit, commands, force):
+    """Cut thruster commands (N) at the limit; `force` (N) becomes what they then make."""
     beyond = False
     for j in range(commands.size):
         beyond |= abs(commands[j]) > limit
     if beyond:
-        f_x, f_y = 0.0, 0.0
+        force[:] = 0.0
         for j in range(commands.size):
             commands[j] = saturated(commands[j], limit)
-            f_x += T[0, j] * commands[j]
-            f_y += T[1, j] * commands[j]
-    return f_x, f_y
+            for axis in range(force.size):
+                force[axis] += T[axis, j] * commands[j]
+
+
+@piece
+def heading_error(theta, distance, asked):
+    """Heading less that of the guidance, rad, at a distance from the line that it aims at, m."""
+    heading = 0.0
+    for i in range(theta.size):
+        heading += theta[i]
+    heading = heading / theta.size if asked[HEAD_HEADING] == 0.0 else theta[-1]
+    return heading - line_of_sight(distance, asked[LOOK_AHEAD])
+
+
+@piece
+def write_down(record, n, t, reference, error, force, commands, theta, surface, state):
+    """Fill in sample `n` of a record, but for the disturbance, which follows the physics step."""
+    record.time[n], record.theta[n] = t, theta
+    record.effort[n] = np.abs(commands).mean()
+    for axis in range(error.size):
+        record.reference[n, axis], record.error[n, axis] = reference[axis], error[axis]
+        record.force[n, axis] = force[axis]
+        record.sigma[n, axis] = surface * state[axis, 0] + state[axis, 1]
+        record.observer_error[n, axis] = error[axis] - state[axis, 0]
 
 
 @compiled
@@ -161,94 +183,55 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
 
     `noise` (m) has a row for each control instant; when it ends, its last row stays.
     """
-    links, h, substeps = plant.links, plant.h, plant.substeps
-    period = substeps * h
-    block, wide = block_at(blocks, 0, 0.0), spread(0.0)
-    row = blocks[0]
-    sine = row[row_of(SIN, links) : row_of(SIN, links) + links]
-    cosine = row[row_of(COS, links) : row_of(COS, links) + links]
-    theta = row[row_of(THETA, links) : row_of(THETA, links) + links]
-    thrusters = plant.thruster_links.size
+    links, h, thrusters = plant.links, plant.h, plant.thruster_links.size
+    period = plant.substeps * h
+    block, wide, row = block_at(blocks, 0, 0.0), spread(0.0), blocks[0]
+    sine = row[row_of(SIN, links) :][:links]
+    cosine = row[row_of(COS, links) :][:links]
+    theta = row[row_of(THETA, links) :][:links]
+    commands = row[first_command(links) :][:thrusters]
     asked = row[body_rows(links, thrusters) :]
-    commands = row[first_command(links) : first_command(links) + thrusters]
     T, wrench, work = np.empty((3, thrusters)), np.empty(3), np.empty((7, 3))
-    sta = law.reading == SUPER_TWISTING
-    gains = law.super_twisting
+    sta, gains = law.reading == SUPER_TWISTING, law.super_twisting
     k_sta = observer_gains(gains.observer_gain, gains.k2_exponent)
     k_pd = observer_gains(law.pd.observer_gain, law.pd.k2_exponent)
     k = k_sta if sta else k_pd
     heading_gain = gains.heading_gain if sta else law.pd.heading_gain
     surface = gains.surface if sta else law.pd.surface
-    state_x, state_y = np.zeros(6), np.zeros(6)
-    state_x[5] = state_y[5] = gains.alpha_start
-    start_x, start_y = law.start
-    f_x, f_y = 0.0, 0.0
+    state, force, error = np.zeros((2, 6)), np.zeros(2), np.zeros(2)
+    state[:, 5] = gains.alpha_start
     for step in range(record.time.size * every):
         t = step * h
         p_x, p_y, v_x, v_y, a_x, a_y = path(
             t, asked[SPEED], asked[SWAY], asked[FREQUENCY], asked[RAMP]
         )
-        e_x, e_y = row[P_X] - p_x, row[P_Y] - p_y
+        position, rate, acceleration = (p_x, p_y), (v_x, v_y), (a_x, a_y)
+        error[0], error[1] = row[P_X] - p_x, row[P_Y] - p_y
         if plant.moving_water:
             move_water(block, 0.0, h)
         base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
-        if step % substeps == 0:
-            instant = step // substeps
-            started = float(instant)
-            noise_x, noise_y = noise[min(instant, noise.shape[0] - 1)]
-            f_x = law_force(
-                law,
-                k,
-                started,
-                e_x + noise_x,
-                row[V_X],
-                v_x,
-                a_x,
-                start_x,
-                f_x,
-                period,
-                mass,
-                state_x,
-            )
-            f_y = law_force(
-                law,
-                k,
-                started,
-                e_y + noise_y,
-                row[V_Y],
-                v_y,
-                a_y,
-                start_y,
-                f_y,
-                period,
-                mass,
-                state_y,
-            )
-            heading = 0.0
-            for i in range(links):
-                heading += theta[i]
-            heading = heading / links if asked[HEAD_HEADING] == 0.0 else theta[links - 1]
-            distance = row[P_Y] + noise_y - (p_y if asked[CROSS_TRACK] > 0.0 else 0.0)
-            wrench[0], wrench[1] = f_x, f_y
-            wrench[2] = -heading_gain * (heading - line_of_sight(distance, asked[LOOK_AHEAD]))
+        if step % plant.substeps == 0:
+            instant = step // plant.substeps
+            measured = noise[min(instant, noise.shape[0] - 1)]
+            for axis in range(error.size):
+                y, v = error[axis] + measured[axis], row[V_X + axis]
+                asked_for = rate[axis], acceleration[axis], law.start[axis]
+                force[axis] = law_force(
+                    law, k, float(instant), y, v, asked_for, force[axis], period, mass, state[axis]
+                )
+            distance = row[P_Y] + measured[1] - (p_y if asked[CROSS_TRACK] > 0.0 else 0.0)
+            wrench[:2] = force
+            wrench[2] = -heading_gain * heading_error(theta, distance, asked)
             allocation_matrix(
                 sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T
             )
             allocate(T, wrench, 3, work, commands)
-            f_x, f_y = saturate(T, row[LIMIT], commands, f_x, f_y)
+            saturate(T, row[LIMIT], commands, force)
         if step % every == 0:
-            n = step // every
-            record.time[n] = t
-            record.reference[n, 0], record.reference[n, 1] = p_x, p_y
-            record.error[n, 0], record.error[n, 1] = e_x, e_y
-            record.force[n, 0], record.force[n, 1] = f_x, f_y
-            record.effort[n] = np.abs(commands).mean()
-            record.theta[n] = theta
-            record.sigma[n, 0] = surface * state_x[0] + state_x[1]
-            record.sigma[n, 1] = surface * state_y[0] + state_y[1]
-            record.observer_error[n, 0] = e_x - state_x[0]
-            record.observer_error[n, 1] = e_y - state_y[0]
+            write_down(
+                record, step // every, t, position, error, force, commands, theta, surface, state
+            )
         physics_step(block, 0.0, wide, WIDTH, plant, base)
         if step % every == 0:
-            record.disturbance[step // every, 0] = row[A_X] - f_x / mass
-            record.disturbance[step // every, 1] = row[A_Y] - f_y / mass
+            for axis in range(error.size):
+                record.disturbance[step // every, axis] = row[A_X + axis] - force[axis] / mass
