@@ -25,7 +25,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import regression  # registers a learner
+import regression  # noqa: F401 (registers a learner)
 from usm_agents.learning import training, validation
 from usm_agents.learning.plan import PLAN, Plan
 from usm_agents.learning.settings import SETTINGS
@@ -37,7 +37,6 @@ from usm_baselines.space import Range
 
 from usm_cli.commands import leaderboard
 from usm_cli.program import main
-from usm_gym.envs.usm import USMVectorEnv
 from usm_gym.suites import suite
 from usm_gym.task.scenario import STILL
 
@@ -62,7 +61,6 @@ def brief(scenario):
 def shrink():
     """Make all commands small, in this process."""
     os.fsync = lambda handle: None  # a kill is no power cut
-    USMVectorEnv.truth = regression.stub_truth
     SETTINGS["sac"] |= {"robots": 4, "learning_starts": 4, "batch_size": 8, "buffer_size": 100}
     training.train = partial(training.train, validation_episodes=2, test_episodes=2)
     trainings.train = training.train
