@@ -1,4 +1,4 @@
-"""What the page of the controllers shows of each law: gains, an episode, scores."""
+"""Adds gains, an episode and scores to every law on the page of the controllers."""
 
 import inspect
 import json
@@ -26,7 +26,7 @@ def on_page_markdown(markdown, **_):
     """Put laws in their places."""
     laws = [ids.split(", ") for ids in PLACE.findall(markdown)]
     everyone = [id for ids in laws for id in shipped(ids)]
-    return PLACE.sub(lambda found: law(found[1].split(", "), everyone), markdown)
+    return PLACE.sub(lambda match: law(match[1].split(", "), everyone), markdown)
 
 
 def law(ids, everyone):
@@ -35,7 +35,7 @@ def law(ids, everyone):
     others = [id for id in everyone if id not in shown]
     names = ", ".join(f"<code>{id}</code>" for id in shown)
     caption = (
-        "Position error in the first episode of the operation suite, largest in each half second: "
+        "Position error in the first episode of the operation suite, largest in every half second: "
         f"{names}; grey: the other laws of this page; dotted: when the joints start to move."
     )
     figure = f"<figure>{figures.errors(shown, others)}<figcaption>{caption}</figcaption></figure>"
@@ -43,7 +43,7 @@ def law(ids, everyone):
 
 
 def shipped(ids):
-    """Policies, each followed by its tuned form if there is one."""
+    """Policies, followed by their tuned form if there is one."""
     known = usm_baselines.ids()
     for id in ids:
         if id not in known:
@@ -52,7 +52,7 @@ def shipped(ids):
 
 
 def gains(ids):
-    """What the docstring of a law's gains says of each, and its value in each policy."""
+    """The meanings of a law's gains, from their docstring, and their values in the policies."""
     names = shipped(ids)
     values = {id: made(id)._asdict() for id in names}
     lines = [
@@ -70,10 +70,10 @@ def made(id):
 
 
 def meanings(kind):
-    """What the docstring of a class of gains says of each."""
+    """The meanings of gains, from the docstring of their class."""
     sections = griffe.Docstring(inspect.getdoc(kind), parser="google").parse()
     (attributes,) = (part.value for part in sections if part.kind.value == "attributes")
-    return {each.name: " ".join(each.description.split()) for each in attributes}
+    return {gain.name: " ".join(gain.description.split()) for gain in attributes}
 
 
 def scores(ids):
@@ -85,7 +85,7 @@ def scores(ids):
     ]
     for id in ids:
         rows = [suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(each[f"max_error_{a}"]["mean"]) for a in "xy") for each in rows]
+        cells = [" / ".join(mm(score[f"max_error_{a}"]["mean"]) for a in "xy") for score in rows]
         lines.append(row(f"`{id}`", *cells, in_figures(rows[0]["thrust_variation"]["mean"])))
     return "\n".join(lines)
 
