@@ -14,7 +14,6 @@ from mkdocs.exceptions import PluginError
 import usm_gym
 from usm_gym.support.text import figures as in_figures
 from usm_gym.support.text import mm
-from usm_gym.task.nominal import nominal_of
 
 LEADERBOARD = Path(__file__).parents[2] / "results" / usm_gym.__version__ / "leaderboard.json"
 SHOWN = {"operation": "field", "operation-ideal": "ideal", "operation-rough": "rough"}
@@ -66,7 +65,7 @@ def gains(ids):
 
 def made(id):
     """The gains of a policy."""
-    return usm_baselines.make(id, nominal_of(usm_gym.Robot(), figures.scenario())).gains
+    return usm_baselines.make(id, figures.scenario().nominal).gains
 
 
 def meanings(kind):

@@ -126,9 +126,10 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
 
 
 def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
+    from support.episodes import METRICS
     from usm_baselines.contender import contender
 
-    from usm_gym.evaluation import METRICS, Evaluation
+    from usm_gym.evaluation import Evaluation
 
     def scores(error: float) -> Evaluation:
         return Evaluation({name: np.full(50, error) for name in METRICS}, np.zeros(50, bool))
@@ -149,9 +150,10 @@ def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
 
 
 def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper() -> None:
+    from support.episodes import METRICS
     from usm_baselines.contender import contender
 
-    from usm_gym.evaluation import METRICS, Evaluation
+    from usm_gym.evaluation import Evaluation
 
     order = ("lqg", "lqg-tuned", "sta-tuned", "pid-tuned", "sta", "pid")
     rows = board.ranked(

@@ -10,7 +10,7 @@ from usm_gym.suites import NAMES
 from usm_gym.suites import __main__ as writer
 from usm_gym.support.seeding import EVALUATION, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named, sample
+from usm_gym.task.sampling import named, sample
 
 
 @pytest.mark.parametrize(

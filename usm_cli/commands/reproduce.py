@@ -28,7 +28,8 @@ from usm_gym.support.files import write_json, write_text
 from usm_gym.support.provenance import provenance
 from usm_gym.support.text import figures
 from usm_gym.support.validation import require
-from usm_gym.task.scenario import MODES, Scenario, named
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import MODES, Scenario
 
 DESCRIPTION = """\
 Run the paper as printed: explicit laws and observer at a step of 1e-5 s, ideal thrusters without

@@ -11,7 +11,8 @@ from usm_gym.support.files import write_text
 from usm_gym.support.seeding import SUITE, stream
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import MODES, Mode, Scenario, named, sample
+from usm_gym.task.sampling import named, sample
+from usm_gym.task.scenario import MODES, Mode, Scenario
 
 SEED = 20261122
 RECIPES: dict[str, tuple[Mode, str, int]] = {

@@ -17,7 +17,8 @@ from usm_agents.residual.task import RESIDUAL_SCALE, ActionKind, Frames, Residua
 from usm_gym.support.files import read_bytes, write_json
 from usm_gym.support.validation import Count, in_one_line, require, validated
 from usm_gym.task.conditions import FIELD, Conditions
-from usm_gym.task.scenario import Mode, Scenario, sample
+from usm_gym.task.sampling import sample
+from usm_gym.task.scenario import Mode, Scenario
 
 PLAN = "plan.json"
 # The scenarios on which an agent is scored in the end, as `usm evaluate` samples them.

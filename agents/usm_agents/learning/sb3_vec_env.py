@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from usm_agents.residual.env import ResidualVectorEnv
-from usm_gym.envs.vector_env import USMVectorEnv
+from usm_gym.envs.usm import USMVectorEnv
 from usm_gym.support.validation import require
 
 

@@ -14,8 +14,8 @@ from usm_baselines.laws.super_twisting import SuperTwisting
 
 from usm_agents.residual.observation import BASE_STATES, ResidualLayout
 from usm_agents.residual.task import Array, Flags, Memory, Residual
-from usm_gym.envs.env import USMEnv, checked_action
-from usm_gym.envs.vector_env import USMVectorEnv
+from usm_gym.envs.env import checked_action
+from usm_gym.envs.usm import USMEnv, USMVectorEnv
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 

@@ -10,8 +10,8 @@ from usm_baselines.laws.mpc import MPC
 from usm_baselines.laws.pd import PD
 from usm_baselines.laws.super_twisting import SuperTwisting
 
+from usm_gym.sensors import Entry, Layout
 from usm_gym.support.validation import require
-from usm_gym.task.observation import Entry, Layout
 
 _RATE = Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer")
 _DISTURBANCE = Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same")

@@ -13,20 +13,9 @@ from usm_baselines.signals import Signals
 
 from usm_agents.residual.observation import BASE_STATES, ResidualLayout
 from usm_gym.kernels.compile import compiled, piece, shared
-from usm_gym.plant.measure import (
-    HEADING_ERROR,
-    JOINT_ANGLES,
-    JOINT_RATES,
-    JOINT_REFERENCE_ACCELERATIONS,
-    JOINT_REFERENCE_RATES,
-    JOINT_REFERENCES,
-    TAIL_ANGLE,
-    TAIL_RATE,
-    THRUSTER_COMMAND,
-    THRUSTER_LIMIT,
-    value,
-)
 from usm_gym.policy import Policy
+from usm_gym.sensors import value
+from usm_gym.task.observation import ENTRY as PLAIN
 from usm_gym.task.observation import ObservationLayout
 
 Array = NDArray[np.float64]
@@ -39,7 +28,7 @@ ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
 
 
 class Plain(NamedTuple):
-    """How the plain observation is read, see `usm_gym.plant.measure.value`.
+    """How the plain observation is read, see `usm_gym.sensors.value`.
 
     Attributes:
         starts: First index of each entry.
@@ -134,7 +123,7 @@ def fill_axes(frame, starts, signals, estimates, innovation, b):
 @piece
 def fill_wrench(frame, starts, seen, plain, T, action):
     """Fill in the wrench that the base asks for, thrusters of even and odd place added up apart."""
-    limit = value(seen, plain, THRUSTER_LIMIT, 0)
+    limit = value(seen, plain, PLAIN.thruster_limit, 0)
     for row in range(3):
         even, odd = 0.0, 0.0
         for j in range(0, action.size, 2):
@@ -148,21 +137,21 @@ def fill_wrench(frame, starts, seen, plain, T, action):
 @piece
 def fill_posture(frame, starts, seen, plain, terms):
     """Fill in heading and joint motion."""
-    tail, rate = value(seen, plain, TAIL_ANGLE, 0), value(seen, plain, TAIL_RATE, 0)
-    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, JOINT_ANGLES, terms)
-    frame[starts[ENTRY.heading_error]] = value(seen, plain, HEADING_ERROR, 0)
-    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(seen, plain, JOINT_RATES, terms)
-    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, JOINT_ANGLES, terms)
-    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, JOINT_RATES, terms)
+    tail, rate = value(seen, plain, PLAIN.tail_angle, 0), value(seen, plain, PLAIN.tail_rate, 0)
+    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, PLAIN.joint_angles, terms)
+    frame[starts[ENTRY.heading_error]] = value(seen, plain, PLAIN.heading_error, 0)
+    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(seen, plain, PLAIN.joint_rates, terms)
+    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, PLAIN.joint_angles, terms)
+    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, PLAIN.joint_rates, terms)
     reference = starts[ENTRY.reference_deflection]
-    frame[reference] = over_joints(seen, plain, JOINT_REFERENCES, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_references, terms)
     reference = starts[ENTRY.reference_deflection_rate]
-    frame[reference] = over_joints(seen, plain, JOINT_REFERENCE_RATES, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_rates, terms)
     reference = starts[ENTRY.reference_deflection_acceleration]
-    frame[reference] = over_joints(seen, plain, JOINT_REFERENCE_ACCELERATIONS, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_accelerations, terms)
     bending = 0.0
     for i in range(terms.size):
-        if value(seen, plain, JOINT_REFERENCES, i) != 0.0:
+        if value(seen, plain, PLAIN.joint_references, i) != 0.0:
             bending += 1.0
     frame[starts[ENTRY.bending_joints]] = bending
 
@@ -172,7 +161,7 @@ def show(
     table, plain, signals, estimates, innovation, action, state, last, start, past, seen, kept
 ):
     """Fill in the observations `seen` and the frames `kept` of a batch; see `ResidualObserver`."""
-    joints = plain.starts[JOINT_RATES] - plain.starts[JOINT_ANGLES]
+    joints = plain.starts[PLAIN.joint_rates] - plain.starts[PLAIN.joint_angles]
     frame, terms = np.empty(table.complete), np.empty(joints)
     starts, width = table.starts, table.shown.size
     for b in range(seen.shape[0]):
@@ -182,7 +171,7 @@ def show(
             frame[table.base[k, 0]] = state[b, table.base[k, 1]]
         fill_wrench(frame, starts, measured, plain, signals.allocation[b], action[b])
         for j in range(action.shape[1]):
-            command = value(measured, plain, THRUSTER_COMMAND, j)
+            command = value(measured, plain, PLAIN.thruster_command, j)
             frame[starts[ENTRY.thruster_command] + j] = command
         for i in range(last.shape[1]):
             frame[starts[ENTRY.last_action] + i] = 0.0 if start[b] else last[b, i]

@@ -93,7 +93,7 @@ def dissect(
     watched = []
     for each in (policy, policy.base, Oracle(nominal)):
         recorder = Recorder(nominal, each, limit)
-        rollout(recorder, scenarios, Robot())
+        rollout(recorder, scenarios)
         watched.append(recorder)
     total, alone, needed = (np.stack(recorder.total)[settled:] for recorder in watched)
     base = np.stack(watched[0].base)[settled:]

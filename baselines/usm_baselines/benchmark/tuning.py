@@ -36,7 +36,8 @@ from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
 from usm_gym.support.validation import in_one_line, require
 from usm_gym.task.conditions import FIELD, Conditions
-from usm_gym.task.scenario import Mode, Scenario, sample
+from usm_gym.task.sampling import sample
+from usm_gym.task.scenario import Mode, Scenario
 
 # Cost of thrust variation, mm per N/s. The front of error against variation comes from sweeping it.
 VARIATION_WEIGHT = 0.002

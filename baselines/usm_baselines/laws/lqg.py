@@ -138,7 +138,7 @@ def joint_lqg(signals, model, linear, gain, state, ahead, force):
         for axis in range(2):
             inertia, transition = linear.inertia[axis], linear.transition[axis]
             last, thrust = held_force(signals, model, b, axis) / inertia, 0.0
-            for j in range(model.thruster_links.size):
+            for j in range(model.thrusters):
                 thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
             own[ERROR], own[RATE] = state[b, 3 * axis], state[b, 3 * axis + 1]
             own[DISTURBANCE], own[THRUST] = 0.0, thrust / inertia
@@ -188,7 +188,7 @@ class JointLQG(LQG):
         """Compute the gains; gains other than the defaults by name, see `JointLQGGains`."""
         super().__init__(nominal, **gains)
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
-        self._predictor = Predictor(nominal, self._model, self._linear.correction)
+        self._predictor = Predictor(nominal, self._linear.correction)
 
     @property
     def law_shape(self) -> tuple[int, ...]:

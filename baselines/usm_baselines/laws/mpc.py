@@ -106,7 +106,7 @@ class MPC(ScriptedPolicy):
         )
         self._periods = max(1, round(self.gains.horizon / nominal.control_period))
         self._inertia = linear.inertia
-        self._predictor = Predictor(nominal, self._model, linear.correction)
+        self._predictor = Predictor(nominal, linear.correction)
         weights = self.gains.variation_weight * linear.inertia
         self._gain = np.stack(
             [

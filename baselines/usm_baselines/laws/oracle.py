@@ -85,7 +85,7 @@ class Oracle(ScriptedPolicy):
     def force(self, signals: Signals, law_state: Array) -> Array:
         """Run ahead with the commands held, and correct what comes of it."""
         copy: Any = self._copy
-        held = (copy.command / copy.limit[:, np.newaxis]).astype(np.float32)
+        held = (copy.read("command") / copy.limit[:, np.newaxis]).astype(np.float32)
         ahead = np.empty((self._periods, copy.size, 2, 1))
         for period in ahead:
             copy.step(held)
@@ -102,6 +102,6 @@ class Oracle(ScriptedPolicy):
             or copy.size != len(scenarios)
             or copy.scenarios[0].conditions.timing != timing
         ):
-            copy = Simulation(self.nominal.robot, scenarios)
+            copy = Simulation(scenarios)
         copy.restore(snapshot)
         return copy

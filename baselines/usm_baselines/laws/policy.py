@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from usm_baselines.signals import Array, Signals, act, model_of, room_for_signals, sense
+from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Range
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
 
 # Where the heading controller, which all laws share, is tuned.
 HEADING_RANGE = Range(30.0, 300.0, "N m/rad")
@@ -51,15 +52,14 @@ class ScriptedPolicy:
             require(gain > 0 or name not in self.positive, name, gain, "a number > 0")
         self.nominal = nominal
         self.gains = type(gains)(*map(float, gains))
-        self._model = model_of(nominal)
-        self._thrusters = len(nominal.robot.thrusters)
+        self._world, self._model = world_of(nominal.robot), model_of(nominal)
         # Before the law's own numbers stand those that all laws share.
-        self._own = 1 + 2 * self._thrusters
+        self._own = shared_size(self._model)
 
     @property
     def law_shape(self) -> tuple[int, ...]:
         """Shape of the law's state for one robot; by default `law_size` numbers for each axis."""
-        return (2, self.law_size)
+        return (self._model.axes, self.law_size)
 
     def law_state(self, state: Array) -> Array:
         """The law's own part of what `predict` returns, (batch, *law_shape), as a copy.
@@ -121,12 +121,12 @@ class ScriptedPolicy:
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         size = len(observation)
-        signals = room_for_signals(observation, self._thrusters)
+        signals = signals_of(observation, self._model, self._world)
         sense(state, self._model, signals)
         law_state = self.law_state(state)
         force = self.force(signals, law_state)
         state[:, self._own :] = law_state.reshape(size, -1)
-        action = np.empty((size, self._thrusters), np.float32)
+        action = np.empty((size, self._model.thrusters), np.float32)
         gain = float(self.gains.heading_gain)
         act(observation, state, self._model, signals.allocation, force, gain, action)
         return action

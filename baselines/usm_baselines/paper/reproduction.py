@@ -18,7 +18,8 @@ from usm_baselines.laws.pd import FORCE, MASS, OBSERVER, PDGains
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.paper.paper_rate import Law, Record, simulate
 from usm_gym.task.metrics import max_error, settled_error
-from usm_gym.task.scenario import MODES, Mode, Scenario, named
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import MODES, Mode, Scenario
 
 A = TypeVar("A")
 K = TypeVar("K")

@@ -14,7 +14,7 @@ from usm_baselines.paper.paper_rate import Array, Law, Record, simulate
 from usm_baselines.paper.reproduction import IMPLICIT_STEP, SAMPLE_TIME, at_step
 from usm_gym.robot import Robot
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 AXES = ("x", "y")
 Records = dict[tuple[str, Any], Record]

@@ -32,8 +32,10 @@ from usm_baselines.paper.reproduction import (
 from usm_gym.support.files import read_json, write_json
 from usm_gym.support.provenance import provenance
 from usm_gym.support.validation import in_one_line
-from usm_gym.task.metrics import LOST_ERROR, max_error, settled_error
-from usm_gym.task.scenario import Mode, Scenario, named
+from usm_gym.task.loss import LOST_ERROR
+from usm_gym.task.metrics import max_error, settled_error
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import Mode, Scenario
 
 Array = NDArray[np.float64]
 

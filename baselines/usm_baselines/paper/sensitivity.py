@@ -27,7 +27,8 @@ from usm_gym.support.files import read_json, write_json
 from usm_gym.support.provenance import provenance
 from usm_gym.support.validation import in_one_line
 from usm_gym.task.metrics import max_error, settled_error
-from usm_gym.task.scenario import MODES, Mode, named
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import MODES, Mode
 
 ROWS = ("sta", "pd")
 # Starts of the sliding variable in both axes, m/s, for the study of the oscillation that remains.

@@ -20,9 +20,7 @@ from usm_agents.learning.training import DivergedError, train
 
 import usm_gym
 from usm_cli.program import main
-from usm_gym.robot import Robot
 from usm_gym.support.files import holding
-from usm_gym.task.nominal import nominal_of
 
 PLAN = Plan(steps=4096, interval=1024)
 SILENT = lambda steps, line: None  # noqa: E731
@@ -59,7 +57,7 @@ def test_a_training_that_is_stopped_goes_on_to_the_bit(algorithm, tmp_path):
     for ours, theirs in zip(*(model.policy.parameters() for model in models), strict=True):
         assert (ours == theirs).all()
     scenarios = usm_gym.suite("operation")[:1]
-    policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path / "stopped"))
+    policy = make_agent(scenarios[0].nominal, str(tmp_path / "stopped"))
     assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 
@@ -156,7 +154,7 @@ def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeyp
     curve = train(longer, tmp_path, SILENT, resume=True)
     assert [point["steps"] for point in curve] == [0, 100, 200, 300]
     scenarios = usm_gym.suite("operation")[:1]
-    policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path))
+    policy = make_agent(scenarios[0].nominal, str(tmp_path))
     assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 

@@ -16,7 +16,6 @@ from usm_agents.residual.task import Residual, ResidualPolicy
 
 import usm_gym
 from usm_gym.robot import Robot
-from usm_gym.task.nominal import nominal_of
 
 ID = "usm_agents:USM-OperationResidual-v0"
 TORPEDO = "usm_agents:USM-TorpedoResidual-v0"
@@ -83,7 +82,7 @@ def test_a_zero_residual_is_the_base_to_the_bit_in_a_vector():
 
 def test_a_zero_residual_scores_as_the_base():
     scenarios = usm_gym.suite("operation")[:3]
-    nominal = nominal_of(Robot(), scenarios[0])
+    nominal = scenarios[0].nominal
     ours = usm_gym.evaluate(ResidualPolicy(Residual(nominal), Still()), scenarios)
     base = usm_gym.evaluate(usm_baselines.make("sta", nominal), scenarios)
     for name, values in base.per_episode.items():

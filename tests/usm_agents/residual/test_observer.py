@@ -10,9 +10,8 @@ from usm_agents.residual.task import Residual
 from usm_baselines.estimation.estimator import Estimator
 
 from usm_gym.robot import Robot, Thruster
-from usm_gym.task.nominal import nominal_of
 from usm_gym.task.observation import ObservationLayout
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 ID = "usm_agents:USM-OperationResidual-v0"
 SMALL = Robot(
@@ -71,7 +70,7 @@ def expected(residual, memory, observation, estimator_state, start, last):
 @pytest.mark.parametrize("robot", [Robot(), SMALL, LONG], ids=["paper", "small", "long"])
 @pytest.mark.parametrize("base", ["sta", "lqg-joints", "zero"])
 def test_every_entry_of_the_table_is_filled_in_to_the_bit(base, robot):
-    nominal = nominal_of(robot, named("nominal", "operation"))
+    nominal = named("nominal", "operation").nominal
     residual = Residual(nominal, base, omit=("heading",), frames=2)
     layout = residual.layout
     plain = ObservationLayout(robot.links, len(robot.thrusters))

@@ -14,8 +14,7 @@ from usm_baselines.signals import Signals, model_of
 from usm_gym import Robot, Scenario, evaluate
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.nominal import nominal_of
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 ROBOT = Robot()
 # Nothing unknown but the start: nominal water at rest, no noise, thrusters with their lag.
@@ -44,11 +43,11 @@ def signals(simulation: Simulation, started: bool) -> Signals:
 
 def test_the_nominal_plant_is_foreseen() -> None:
     """Commands that are held, joints in full motion: where it goes and where it is said to go."""
-    nominal = nominal_of(ROBOT, scenario())
+    nominal = scenario().nominal
     correction = kalman.linear_model(nominal, 1e-2, 0.1).correction
     predictor = Predictor(nominal, model_of(nominal), correction)
     state = np.zeros((1, predictor.size))
-    simulation = Simulation(ROBOT, [scenario()])
+    simulation = Simulation([scenario()])
     rng = np.random.default_rng(0)
     action = np.zeros((1, 5), np.float32)
     for k in range(86):
@@ -90,7 +89,7 @@ def test_the_first_change_is_that_of_the_least_squares() -> None:
 
 def test_joint_motion_that_is_foreseen_disturbs_little() -> None:
     """Noise of the laws' filters as in field, so that their gains are the same."""
-    nominal = dataclasses.replace(nominal_of(ROBOT, scenario()), position_noise=5e-5)
+    nominal = dataclasses.replace(scenario().nominal, position_noise=5e-5)
     worst = {}
     for id in ("lqg", "lqg-joints", "mpc"):
         gains = {"disturbance_noise": 0.1, "variation_weight": 5e-5}

@@ -10,7 +10,7 @@ from usm_baselines.paper.paper_rate import Law, simulate
 from usm_baselines.paper.reproduction import PAPER, at_step, cases, run_cases, table
 
 from usm_gym.robot import Robot
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 
 @pytest.mark.parametrize(

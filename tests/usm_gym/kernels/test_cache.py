@@ -18,7 +18,7 @@ POSITIONS = """
 import numpy as np
 import usm_baselines
 import usm_gym
-from usm_gym.plant.motion import path_positions
+from usm_gym.task.guidance import path_positions
 positions = np.empty((16, 2))
 path_positions(np.arange(16.0), 0.1, 0.2, 1.0, 2.0, positions)
 misses = sum(path_positions.stats.cache_misses.values())
@@ -29,15 +29,16 @@ import hashlib
 import numpy as np
 from usm_gym import Robot
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import sample
+from usm_gym.task.sampling import sample
 from usm_gym.simulation import Simulation
 draw = np.random.default_rng(0)
 for size in (1, 3):
     scenarios = [sample("operation", PRESETS["rough"], draw) for _ in range(size)]
-    fleet = Simulation(Robot(), scenarios)
+    fleet = Simulation(scenarios)
     for _ in range(100):
         fleet.step(draw.uniform(-1, 1, (size, 5)).astype(np.float32))
-    state = np.concatenate([fleet.observation.ravel(), fleet.error.ravel(), fleet.theta.ravel()])
+    state = [fleet.observation.ravel(), fleet.error.ravel(), fleet.read("theta").ravel()]
+    state = np.concatenate(state)
     print(hashlib.sha256(state.tobytes()).hexdigest())
 """
 
@@ -86,14 +87,12 @@ def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(copy):
 
 LAWS = """
 import numpy as np
-from usm_baselines.estimation import observer
 from usm_baselines.laws.pd import PDGains, pd
 from usm_baselines.laws.pid import PIDGains, pid
-from usm_baselines.signals import room_for_signals
+from usm_baselines.signals import Signals
 
-signals = room_for_signals(np.zeros((1, 1), np.float32), 3)
-for value, signal in enumerate(signals[:5]):
-    signal[...] = 0.1 * (value + 1)
+values = (np.full((1, 2), 0.1 * (k + 1)) for k in range(4))
+signals = Signals(np.ones(1), *values, np.zeros((1, 3, 3)), np.zeros((1, 1), np.float32))
 for law, arguments in ((pd, (PDGains(), 0)), (pid, (PIDGains(),))):
     state, force = np.full((1, 2, 4), 0.01), np.empty((1, 2))
     law(signals, 0.02, 10.0, *arguments, state, force)
@@ -292,7 +291,7 @@ def compiled_once(tmp_path_factory):
 def test_a_damaged_file_of_the_cache_is_named_and_replaced(suffix, damage, compiled_once, tmp_path):
     filled, numbers = compiled_once
     shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
-    (damaged,) = tmp_path.rglob(f"motion.path_positions-*.{suffix}")
+    (damaged,) = tmp_path.rglob(f"guidance.path_positions-*.{suffix}")
     data = damaged.read_bytes()
     kept = {"truncated": data[: len(data) // 2], "empty": b"", "garbage": bytes(len(data))}
     damaged.write_bytes(kept[damage])
