@@ -176,8 +176,7 @@ class World(ABC):
     def rows(self) -> int:
         """Numbers of a robot."""
 
-    @abstractmethod
-    def check(self, scenario: Any) -> None:
+    def check(self, scenario: Any) -> None:  # noqa: B027 (a world may take all scenarios)
         """Refuse a scenario that the robot cannot carry out.
 
         Raises:

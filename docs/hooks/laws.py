@@ -1,15 +1,15 @@
 """Adds gains, an episode and scores to every law on the page of the controllers."""
 
-import inspect
 import json
 import re
 from functools import cache
 from pathlib import Path
 
 import figures
-import griffe
 import usm_baselines
 from mkdocs.exceptions import PluginError
+from usm_baselines.registry import entry
+from usm_baselines.space import declared
 
 import usm_gym
 from usm_gym.support.text import figures as in_figures
@@ -51,28 +51,26 @@ def shipped(ids):
 
 
 def gains(ids):
-    """The meanings of a law's gains, from their docstring, and their values in the policies."""
+    """What a law declares of its gains, and their values in each policy."""
     names = shipped(ids)
     values = {id: made(id)._asdict() for id in names}
     lines = [
-        row("gain", "meaning", *(f"`{id}`" for id in names)),
-        "|---|---|" + "---:|" * len(names),
+        row("gain", "meaning", "unit", "tuned within", *(f"`{id}`" for id in names)),
+        "|---|---|---|---|" + "---:|" * len(names),
     ]
-    for name, meaning in meanings(type(made(ids[0]))).items():
-        lines.append(row(f"`{name}`", meaning, *(f"{values[id][name]:.4g}" for id in names)))
+    for name, gain in declared(type(made(ids[0]))).items():
+        # Readings of one law may differ in units and ranges.
+        ranges = [entry(id).space[name] for id in ids if name in entry(id).space]
+        units = dict.fromkeys(each.unit for each in ranges) or [gain.unit]
+        within = dict.fromkeys(f"{each.low:g} to {each.high:g}" for each in ranges)
+        numbers = (f"{values[id][name]:.4g}" for id in names)
+        lines.append(row(f"`{name}`", gain.meaning, "; ".join(units), "; ".join(within), *numbers))
     return "\n".join(lines)
 
 
 def made(id):
     """The gains of a policy."""
     return usm_baselines.make(id, figures.scenario().nominal).gains
-
-
-def meanings(kind):
-    """The meanings of gains, from the docstring of their class."""
-    sections = griffe.Docstring(inspect.getdoc(kind), parser="google").parse()
-    (attributes,) = (part.value for part in sections if part.kind.value == "attributes")
-    return {gain.name: " ".join(gain.description.split()) for gain in attributes}
 
 
 def scores(ids):

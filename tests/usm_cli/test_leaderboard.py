@@ -57,6 +57,7 @@ def test_every_suite_is_there_and_a_row_with_the_joints_still() -> None:
         assert still == replace(moving, conditions=still.conditions)
 
 
+@pytest.mark.slow
 def test_the_leaderboard_is_the_same_with_one_and_two_workers(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

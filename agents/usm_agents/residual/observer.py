@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.estimation.prediction import ESTIMATES
-from usm_baselines.laws.policy import ScriptedPolicy
+from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
 
-from usm_agents.residual.observation import BASE_STATES, ResidualLayout
+from usm_agents.residual.observation import ResidualLayout, base_entries
 from usm_gym.kernels.compile import compiled, piece, shared
 from usm_gym.policy import Policy
 from usm_gym.sensors import value
@@ -202,16 +201,16 @@ class ResidualObserver:
         frames: int,
     ) -> None:
         """Take the base, whose state is shown, and the layout of the plain observation."""
-        shown = BASE_STATES.get(type(base), {})
-        entries = tuple(shown.values())
+        law = base if isinstance(base, ScriptedPolicy) else None
+        entries = base_entries(law.shown) if law else ()
+        columns = [law.columns[name] for name in law.shown] if law else []
         self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
         whole = ResidualLayout(plain.thrusters, actions, entries)
         numbers, slices = np.arange(whole.size), whole.slices
-        places = np.array([numbers[slices[entry.name]] for entry in entries], np.int64)
-        columns = _columns(base, list(shown)) if shown else np.empty(0, np.int64)
+        places = [numbers[slices[entry.name]] for entry in entries]
         self._table = Table(
             starts=np.array([slices[name].start for name in ENTRY._fields]),
-            base=np.stack([places.ravel(), columns], axis=1),
+            base=np.array([places, columns], np.int64).reshape(2, -1).T.copy(),
             shown=np.concatenate([numbers[slices[entry.name]] for entry in self.layout.frame]),
             scale=self.layout.scale,
             bound=self.layout.bound,
@@ -267,12 +266,3 @@ class ResidualObserver:
 
 
 _NOTHING = np.empty((0, 0))
-
-
-def _columns(base: Policy, indices: list[int]) -> NDArray[np.int64]:
-    """Columns of the base's state with those numbers of the axes, (2 * indices,)."""
-    assert isinstance(base, ScriptedPolicy)
-    columns = base.law_columns
-    if columns.ndim == 1:  # a predictor's: (e, v, d) of x and of y come first
-        columns = columns[:ESTIMATES].reshape(2, -1)
-    return columns[:, indices].T.ravel()

@@ -20,7 +20,7 @@ from usm_agents.artifact.folder import make_agent
 from usm_agents.learning.plan import TEST_SEED
 from usm_agents.residual.task import Memory, ResidualPolicy
 from usm_agents.study.plans import AGENTS
-from usm_agents.study.trainings import Run
+from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy
 from usm_gym.robot import Robot
@@ -155,7 +155,7 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
     return frequency, density
 
 
-def dissected(chosen: Sequence[Run]) -> dict[str, Any]:
+def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Any]:
     """What each agent, as its seed 0, does to its base; see `dissect`."""
     found = {}
     for run in chosen:

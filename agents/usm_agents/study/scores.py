@@ -13,7 +13,7 @@ from usm_baselines.contender import Contender, contender
 from usm_agents.artifact.folder import agent_contender
 from usm_agents.learning.plan import TEST_EPISODES, TEST_SEED
 from usm_agents.study.plans import AGENTS, HOME, TRANSFER
-from usm_agents.study.trainings import Run
+from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import Evaluation, joined
 from usm_gym.robot import Robot
 from usm_gym.statistics import interquartile_mean, interval, ratio_interval
@@ -35,7 +35,7 @@ Document = dict[str, Any]
 
 
 def tasks(
-    chosen: Sequence[Run], rivals: Sequence[str], episodes: int = TEST_EPISODES
+    chosen: Sequence[StudyTraining], rivals: Sequence[str], episodes: int = TEST_EPISODES
 ) -> dict[tuple[str, str], Task]:
     """What is scored, by policy and set: all at home, agents and rivals also elsewhere."""
     robot = Robot()
@@ -90,7 +90,9 @@ def score(
 
 
 def document(
-    chosen: Sequence[Run], scores: Mapping[tuple[str, str], Evaluation], rivals: Sequence[str]
+    chosen: Sequence[StudyTraining],
+    scores: Mapping[tuple[str, str], Evaluation],
+    rivals: Sequence[str],
 ) -> Document:
     """A row for each agent and ablation over its seeds, and one for each rival."""
     rows: dict[str, Any] = {}

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from usm_agents.artifact.folder import read_agent, write_agent
-from usm_agents.learning.checkpoint import CURVE, Point, traces
+from usm_agents.learning.checkpoint import CURVE, traces
 from usm_agents.learning.plan import Plan, read_plan
-from usm_agents.learning.training import VALIDATED, train
+from usm_agents.learning.training import train
+from usm_agents.learning.validation import Validation, is_validation
 from usm_agents.study.plans import AGENTS, PLANS, SEEDS
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json
@@ -18,7 +19,7 @@ from usm_gym.support.validation import require
 
 
 @dataclasses.dataclass(frozen=True)
-class Run:
+class StudyTraining:
     """One training of the study.
 
     Attributes:
@@ -57,28 +58,22 @@ class Run:
         return bool(self.curve[-1]["steps"] >= self.plan.steps)
 
     @property
-    def curve(self) -> list[Point]:
+    def curve(self) -> list[Validation]:
         """The learning curve, as far as it goes.
 
         Raises:
             ValueError: If the file holds none.
         """
         curve = read_json(self.folder / CURVE)
-        valid = isinstance(curve, list) and curve and all(map(is_point, curve))
+        valid = isinstance(curve, list) and curve and all(map(is_validation, curve))
         require(valid, f"file {self.folder / CURVE}", curve, "a learning curve")
-        known: list[Point] = curve
+        known: list[Validation] = curve
         return known
 
 
-def is_point(value: Any) -> bool:
-    """Whether a value is what a validation found."""
-    names = ("steps", "seconds", *VALIDATED, "failures")
-    return isinstance(value, dict) and all(
-        isinstance(value.get(name), (int, float)) for name in names
-    )
-
-
-def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = None) -> list[Run]:
+def runs(
+    names: Sequence[str], seeds: int, folder: Path, steps: int | None = None
+) -> list[StudyTraining]:
     """The trainings of the study, seed by seed, so that an early stop leaves some of each.
 
     Args:
@@ -97,11 +92,13 @@ def runs(names: Sequence[str], seeds: int, folder: Path, steps: int | None = Non
             if seed >= SEEDS[name]:
                 continue
             plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
-            found.append(Run(name, plan, folder / "runs" / f"{name}-{seed}"))
+            found.append(StudyTraining(name, plan, folder / "runs" / f"{name}-{seed}"))
     return found
 
 
-def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], object]) -> None:
+def train_all(
+    chosen: Sequence[StudyTraining], workers: int, report: Callable[[StudyTraining], object]
+) -> None:
     """Train what is not trained yet; an interrupted training goes on where it was.
 
     Only a training of the very plan goes on: its checkpoint is code, which is run.
@@ -119,12 +116,12 @@ def train_all(chosen: Sequence[Run], workers: int, report: Callable[[Run], objec
         report(waiting[index])
 
 
-def train_one(run: Run) -> None:
+def train_one(run: StudyTraining) -> None:
     """Carry out one training."""
     train(run.plan, run.folder, lambda steps, line: None, resume=run.begun)
 
 
-def ship(chosen: Sequence[Run], folder: Path, provenance: Mapping[str, Any]) -> None:
+def ship(chosen: Sequence[StudyTraining], folder: Path, provenance: Mapping[str, Any]) -> None:
     """Put each agent, as its seed 0, under its own name into a folder.
 
     Args:

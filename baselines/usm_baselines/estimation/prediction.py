@@ -28,7 +28,8 @@ from usm_gym.task.observation import ENTRY
 from usm_gym.world import world_of
 
 # Numbers at the start of a predictor's state: (e, v, d) of x and of y.
-ESTIMATES = 6
+NAMES = ("error", "rate", "unmodelled")
+ESTIMATES = 2 * len(NAMES)
 # Physics steps of a prediction in a control period.
 SUBSTEPS = 5
 # The frequency that is assumed of the joint references' filter, rad/s.

@@ -33,6 +33,7 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]
 
 
+@pytest.mark.slow
 def test_scoring_a_shipped_agent_does_not_import_torch():
     code = """
 import sys, usm_agents, usm_baselines, usm_gym

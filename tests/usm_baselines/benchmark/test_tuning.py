@@ -167,6 +167,7 @@ def test_a_storage_that_cannot_be_used_gets_one_line() -> None:
         tune(problem(), "nonsense")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "number"),
     [("ask", 3), ("set_user_attr", 0), ("set_user_attr", 5), *(("tell", n) for n in (0, 3, 7, 19))],

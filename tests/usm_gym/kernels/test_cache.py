@@ -71,6 +71,7 @@ def edit(file, old, new):
     file.write_text(source.replace(old, new))
 
 
+@pytest.mark.slow
 def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(copy):
     folder, environment = copy
     cold = run(POSITIONS, **environment)
@@ -100,6 +101,7 @@ for law, arguments in ((pd, (PDGains(), 0)), (pid, (PIDGains(),))):
 """
 
 
+@pytest.mark.slow
 def test_an_edit_recompiles_the_kernels_that_use_it_and_no_others(copy):
     folder, environment = copy
     (cold_pd, force_pd), (cold_pid, force_pid) = map(str.split, run(LAWS, **environment))
@@ -123,6 +125,7 @@ print(sum(my_laws.law.force.stats.cache_misses.values()), force)
 """
 
 
+@pytest.mark.slow
 def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     sources = {
         "my_laws/__init__.py": "",
@@ -144,6 +147,7 @@ def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     assert run(OWN, **environment) == ["1 8.0"]
 
 
+@pytest.mark.slow
 def test_a_processor_without_vector_or_fused_instructions_computes_the_same_bits(tmp_path):
     generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": tmp_path}
     assert run(FLEET, **generic) == run(FLEET)
@@ -192,6 +196,7 @@ pwd.getpwuid, tempfile.gettempdir = nobody, nowhere
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="users without a home are of POSIX")
 @pytest.mark.parametrize("given", [True, False])
 def test_a_user_without_home_or_temporary_folder_needs_neither(given, tmp_path):
@@ -284,6 +289,7 @@ def compiled_once(tmp_path_factory):
     return folder, run(POSITIONS, NUMBA_CACHE_DIR=folder)[2:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("suffix", "damage"),
     [("nbi", "truncated"), ("nbi", "garbage"), ("nbc", "truncated"), ("nbc", "empty")],

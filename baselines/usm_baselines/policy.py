@@ -13,73 +13,81 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
-from usm_baselines.space import Range
+from usm_baselines.space import Gain, declared
+from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
 
-# Where the heading controller, which all laws share, is tuned.
-HEADING_RANGE = Range(30.0, 300.0, "N m/rad")
+# The gain of the heading controller, which all laws share.
+HEADING_GAIN = Gain(100.0, "N m/rad", "heading gain k_psi", tuned=(30.0, 300.0))
 
 
 class ScriptedPolicy:
-    """A control law behind `predict`; subclasses give `law_size`, `positive` and `force`.
+    """A control law behind `predict`; subclasses give `Gains`, `state` and `control`.
 
     Actions are not clipped: the environment saturates them, and what it has applied comes back in
     the next observation.
 
     Attributes:
         nominal: What the policy knows of the robot.
-        gains: The law's gains, a named tuple with the field `heading_gain`, N m/rad.
+        gains: The law's gains, one of its `Gains`.
         privileged: Whether it has to be given true state; never, here.
     """
 
     privileged = False
-    # Numbers of state that the law keeps for each axis.
-    law_size = 0
-    # Gains that must not be 0.
-    positive: tuple[str, ...] = ()
+    # The law's gains: a `NamedTuple` of `Gain`, with the field `heading_gain`.
+    Gains: type[Any]
+    # Names of the numbers that the law keeps for each axis, in order.
+    state: tuple[str, ...] = ()
+    # Those among them that tell more than the observation does: estimates, adapted gains.
+    shown: tuple[str, ...] = ()
+    # Whether the law computes with the inertia, drag or plant of the planar robot.
+    planar = False
 
-    def __init__(self, nominal: Nominal, gains: Any) -> None:
-        """Keep nominal knowledge and gains.
+    def __init__(self, nominal: Nominal, **gains: float) -> None:
+        """Take gains other than the defaults by name.
 
         Raises:
-            ValueError: If a gain is negative or not finite, or 0 though it is among `positive`.
+            ValueError: If a gain is not finite, is negative, or is 0 and has to be positive; or if
+                the law is for planar robots and this is another.
         """
-        for name, gain in gains._asdict().items():
-            number = isinstance(gain, (int, float)) and np.isfinite(gain) and gain >= 0
-            require(number, name, gain, "a finite number >= 0")
-            require(gain > 0 or name not in self.positive, name, gain, "a number > 0")
+        chosen = self.Gains(**gains)
+        for name, gain in declared(self.Gains).items():
+            value = getattr(chosen, name)
+            number = isinstance(value, (int, float)) and np.isfinite(value) and value >= 0
+            require(number, name, value, "a finite number >= 0")
+            require(value > 0 or not gain.positive, name, value, "a number > 0")
         self.nominal = nominal
-        self.gains = type(gains)(*map(float, gains))
+        self.gains = self.Gains(*map(float, chosen))
         self._world, self._model = world_of(nominal.robot), model_of(nominal)
         # Before the law's own numbers stand those that all laws share.
         self._own = shared_size(self._model)
+        fitting = isinstance(nominal.robot, Robot) or not self.planar
+        require(fitting, "robot", nominal.robot, "the planar robot")
+
+    @property
+    def columns(self) -> dict[str, NDArray[np.int64]]:
+        """Columns of what `predict` returns that hold the numbers of `state`, by name, (axes,)."""
+        first = self._own + len(self.state) * np.arange(self._model.axes, dtype=np.int64)
+        return {name: first + index for index, name in enumerate(self.state)}
+
+    def state_of(self, state: Array) -> dict[str, Array]:
+        """The law's own numbers in what `predict` returns, by name, each (batch, axes)."""
+        return {name: state[:, column] for name, column in self.columns.items()}
 
     @property
     def law_shape(self) -> tuple[int, ...]:
-        """Shape of the law's state for one robot; by default `law_size` numbers for each axis."""
-        return (self._model.axes, self.law_size)
+        """Shape of all that the law keeps of one robot, the numbers of `state` first."""
+        return (self._model.axes, len(self.state))
 
-    def law_state(self, state: Array) -> Array:
-        """The law's own part of what `predict` returns, (batch, *law_shape), as a copy.
-
-        What its numbers are, the law says in its docstring.
-        """
-        return state[:, self._own :].reshape(len(state), *self.law_shape).copy()
-
-    @property
-    def law_columns(self) -> NDArray[np.int64]:
-        """Columns of what `predict` returns in which the law's own numbers stand, (*law_shape)."""
-        columns = self._own + np.arange(math.prod(self.law_shape), dtype=np.int64)
-        return columns.reshape(self.law_shape)
-
-    def force(self, signals: Signals, law_state: Array) -> Array:
-        """The force on the centre of mass, N, (batch, 2); the law's state is advanced in place.
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
+        """Fill in the force on the centre of mass, N, and advance the law's state.
 
         Args:
             signals: What the law works with.
-            law_state: The law's own state, (batch, *law_shape), zero at the start.
+            state: What the law keeps, (batch, *law_shape), zero at the start.
+            force: Where to write the force, (batch, axes).
         """
         raise NotImplementedError
 
@@ -114,7 +122,7 @@ class ScriptedPolicy:
             seen.shape,
             f"({numbers},) or (batch, {numbers})",
         )
-        batch = np.atleast_2d(seen)
+        batch = seen.reshape(-1, numbers)
         new_state = self._state(len(batch), state, episode_start)
         action = self._act(batch, new_state)
         return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
@@ -123,11 +131,12 @@ class ScriptedPolicy:
         size = len(observation)
         signals = signals_of(observation, self._model, self._world)
         sense(state, self._model, signals)
-        law_state = self.law_state(state)
-        force = self.force(signals, law_state)
-        state[:, self._own :] = law_state.reshape(size, -1)
+        own = state[:, self._own :].copy().reshape(size, *self.law_shape)
+        force = np.empty_like(signals.y)
+        self.control(signals, own, force)
+        state[:, self._own :] = own.reshape(size, -1)
         action = np.empty((size, self._model.thrusters), np.float32)
-        gain = float(self.gains.heading_gain)
+        gain = self.gains.heading_gain
         act(observation, state, self._model, signals.allocation, force, gain, action)
         return action
 
