@@ -140,18 +140,25 @@ def make(id: str, env: Any, **gains: Any) -> Policy:
 
 
 def nominal_knowledge(env: Any) -> Nominal:
-    """The nominal knowledge of an environment, whatever it is wrapped in."""
+    """The nominal knowledge of an environment, whatever it is wrapped in.
+
+    Raises:
+        ValueError: If it is not one of this package, or its robots do not share their knowledge.
+    """
     if isinstance(env, Nominal):
         return env
     inner = getattr(env, "unwrapped", env)
     if hasattr(inner, "nominal"):
-        nominal = inner.nominal
+        known = [inner.nominal]
     else:
         require(hasattr(inner, "get_attr"), "env", env, "an environment of this package")
-        nominal = inner.get_attr("nominal")[0]
-    require(isinstance(nominal, Nominal), "env", env, "an environment of this package")
-    known: Nominal = nominal
-    return known
+        known = list(inner.get_attr("nominal"))
+    valid = all(isinstance(nominal, Nominal) for nominal in known)
+    require(valid, "env", env, "an environment of this package")
+    kinds = f"{len(set(known))} kinds"
+    require(len(set(known)) == 1, "nominal knowledge", kinds, "one of all robots")
+    nominal: Nominal = known[0]
+    return nominal
 
 
 register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")

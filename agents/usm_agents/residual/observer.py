@@ -107,7 +107,7 @@ def tail_over_mean(seen, plain, entry, terms):
 @piece
 def fill_axes(frame, starts, signals, estimates, innovation, b):
     """Fill in what is measured and estimated in each axis."""
-    for axis in range(2):
+    for axis in range(signals.y.shape[1]):
         error, rate, disturbance, thrust = estimates[b, axis]
         frame[starts[ENTRY.position_error] + axis] = signals.y[b, axis]
         frame[starts[ENTRY.reference_velocity] + axis] = signals.velocity[b, axis]

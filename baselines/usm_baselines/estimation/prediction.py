@@ -18,6 +18,7 @@ from usm_baselines.signals import Array, Signals, commanded
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.packing import body_row, plant_of
+from usm_gym.planar_world import PlanarWorld
 from usm_gym.plant.layout import *
 from usm_gym.plant.step import Plant, advance
 from usm_gym.robot import Robot
@@ -27,9 +28,11 @@ from usm_gym.task.nominal import Nominal
 from usm_gym.task.observation import ENTRY
 from usm_gym.world import world_of
 
-# Numbers at the start of a predictor's state: (e, v, d) of x and of y.
+# Axes of the plane that the robot is in; numbers at the start of a predictor's state, its NAMES in
+# each axis.
+AXES = len(PlanarWorld.axes)
 NAMES = ("error", "rate", "unmodelled")
-ESTIMATES = 2 * len(NAMES)
+ESTIMATES = AXES * len(NAMES)
 # Physics steps of a prediction in a control period.
 SUBSTEPS = 5
 # The frequency that is assumed of the joint references' filter, rad/s.
@@ -126,7 +129,7 @@ def place(seen, nominal, state, applied, block, lane):
             omega -= value(seen, nominal, ENTRY.joint_rates, i - 1)
         block[(row_of(THETA, links) + i) * WIDTH + lane] = theta
         block[(row_of(OMEGA, links) + i) * WIDTH + lane] = omega
-    for axis in range(2):
+    for axis in range(AXES):
         e, v, d = state[3 * axis], state[3 * axis + 1], state[3 * axis + 2]
         block[(P_X + axis) * WIDTH + lane] = e
         velocity = v + value(seen, nominal, ENTRY.reference_velocity, axis)
@@ -187,7 +190,7 @@ def update(observation, started, nominal, correction, blocks, state):
     for b in range(observation.shape[0]):
         seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         before = own[ESTIMATES + thrusters :]
-        for axis in range(2):
+        for axis in range(AXES):
             y, estimate = (
                 value(seen, nominal, ENTRY.position_error, axis),
                 own[3 * axis : 3 * axis + 3],
@@ -210,7 +213,7 @@ def update(observation, started, nominal, correction, blocks, state):
 def read_ahead(observation, nominal, time, blocks, ahead):
     """Read (error, rate) of a batch off its blocks, `time` after the observations."""
     for b in range(observation.shape[0]):
-        for axis in range(2):
+        for axis in range(AXES):
             block, lane = blocks[b // WIDTH], b % WIDTH
             ahead[b, axis] = error_ahead(observation[b], nominal, time, axis, block, lane)
 
@@ -227,7 +230,7 @@ def held_force(signals, model, b, axis):
 class Predictor:
     """Estimates where the robots of a batch are, and foresees where they will be.
 
-    Its state is an array of numbers for each robot: (e, v, d) of x and of y, the forces of the
+    Its state is an array of numbers for each robot: (e, v, d) of each axis, the forces of the
     thrusters in N, the last observation.
 
     Attributes:
