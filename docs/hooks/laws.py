@@ -1,4 +1,4 @@
-"""What the page of the controllers shows of each law: gains, an episode, scores."""
+"""Adds gains, an episode and scores to every law on the page of the controllers."""
 
 import json
 import re
@@ -25,7 +25,7 @@ def on_page_markdown(markdown, **_):
     """Put laws in their places."""
     laws = [ids.split(", ") for ids in PLACE.findall(markdown)]
     everyone = [id for ids in laws for id in shipped(ids)]
-    return PLACE.sub(lambda found: law(found[1].split(", "), everyone), markdown)
+    return PLACE.sub(lambda match: law(match[1].split(", "), everyone), markdown)
 
 
 def law(ids, everyone):
@@ -34,7 +34,7 @@ def law(ids, everyone):
     others = [id for id in everyone if id not in shown]
     names = ", ".join(f"<code>{id}</code>" for id in shown)
     caption = (
-        "Position error in the first episode of the operation suite, largest in each half second: "
+        "Position error in the first episode of the operation suite, largest in every half second: "
         f"{names}; grey: the other laws of this page; dotted: when the joints start to move."
     )
     figure = f"<figure>{figures.errors(shown, others)}<figcaption>{caption}</figcaption></figure>"
@@ -42,7 +42,7 @@ def law(ids, everyone):
 
 
 def shipped(ids):
-    """Policies, each followed by its tuned form if there is one."""
+    """Policies, followed by their tuned form if there is one."""
     known = usm_baselines.ids()
     for id in ids:
         if id not in known:
@@ -82,7 +82,7 @@ def scores(ids):
     ]
     for id in ids:
         rows = [suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(each[f"max_error_{a}"]["mean"]) for a in "xy") for each in rows]
+        cells = [" / ".join(mm(score[f"max_error_{a}"]["mean"]) for a in "xy") for score in rows]
         lines.append(row(f"`{id}`", *cells, in_figures(rows[0]["thrust_variation"]["mean"])))
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""What the site takes from the rest of the repository: pages, results, notebooks, speed."""
+"""Adds pages, results, notebooks and speed from the rest of the repository to the site."""
 
 import json
 from pathlib import Path
@@ -49,14 +49,14 @@ def speed(path):
     """The figures of `usm bench` as a table, with the command and the machine."""
     if not path.exists():
         return "No measurement has been published with this version."
-    found = json.loads(path.read_text(encoding="utf-8"))
+    measured = json.loads(path.read_text(encoding="utf-8"))
     lines = ["| what | median | smallest | largest |", "|---|---:|---:|---:|"]
     for name, meaning in MEANINGS.items():
-        if name in found["spread"]:
-            spread = found["spread"][name]
+        if name in measured["spread"]:
+            spread = measured["spread"][name]
             numbers = " | ".join(figures(spread[key]) for key in ("median", "low", "high"))
             lines.append(f"| {meaning} | {numbers} |")
-    machine, source = found["machine"], found["provenance"]
+    machine, source = measured["machine"], measured["provenance"]
     where = f"{machine['processor']}, {machine['cores']} cores, {machine['system']}"
     by = f"By `{source['command']}`, commit {source['commit']}, on {where}."
     return "\n".join([by, "", *lines])

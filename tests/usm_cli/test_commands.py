@@ -186,6 +186,7 @@ class Waiting:
 """
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
     (tmp_path / "mine.py").write_text(WAITING)
