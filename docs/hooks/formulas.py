@@ -13,7 +13,7 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>',
 
 def on_page_content(html, **_):
     """Draw the formulas of a page."""
-    return FORMULA.sub(lambda found: formula(unescape(found[2]), found[1] == "div"), html)
+    return FORMULA.sub(lambda match: formula(unescape(match[2]), match[1] == "div"), html)
 
 
 def formula(latex, block):

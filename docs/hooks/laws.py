@@ -1,7 +1,6 @@
 """What the page of the controllers shows of each law: gains, an episode, scores."""
 
 import inspect
-import json
 import re
 from functools import cache
 from pathlib import Path
@@ -10,6 +9,7 @@ import figures
 import griffe
 import usm_baselines
 from mkdocs.exceptions import PluginError
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
 
 import usm_gym
 from usm_gym.support.text import figures as in_figures
@@ -26,7 +26,7 @@ def on_page_markdown(markdown, **_):
     """Put laws in their places."""
     laws = [ids.split(", ") for ids in PLACE.findall(markdown)]
     everyone = [id for ids in laws for id in shipped(ids)]
-    return PLACE.sub(lambda found: law(found[1].split(", "), everyone), markdown)
+    return PLACE.sub(lambda place: law(place[1].split(", "), everyone), markdown)
 
 
 def law(ids, everyone):
@@ -78,22 +78,27 @@ def meanings(kind):
 
 def scores(ids):
     """The rows of policies in the leaderboard."""
-    suites = leaderboard()
+    board = leaderboard()
     lines = [
-        row("x / y, mm", *(f"`{conditions}`" for conditions in SHOWN.values()), "variation, N/s"),
+        row(
+            f"{' / '.join(board.axes)}, mm",
+            *(f"`{conditions}`" for conditions in SHOWN.values()),
+            "variation, N/s",
+        ),
         "|---|" + "---:|" * (len(SHOWN) + 1),
     ]
     for id in ids:
-        rows = [suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(each[f"max_error_{a}"]["mean"]) for a in "xy") for each in rows]
-        lines.append(row(f"`{id}`", *cells, in_figures(rows[0]["thrust_variation"]["mean"])))
+        rows = [board.suites[suite][id] for suite in SHOWN]
+        cells = [" / ".join(mm(error.mean) for error in each.errors.values()) for each in rows]
+        variation = rows[0].metrics["thrust_variation"].mean
+        lines.append(row(f"`{id}`", *cells, in_figures(variation)))
     return "\n".join(lines)
 
 
 @cache
 def leaderboard():
-    """The suites of the leaderboard."""
-    return json.loads(LEADERBOARD.read_text(encoding="utf-8"))["suites"]
+    """The leaderboard of this version."""
+    return LeaderboardResult.read(LEADERBOARD)
 
 
 def row(*cells):

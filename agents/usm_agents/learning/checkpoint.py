@@ -24,7 +24,7 @@ from usm_agents.artifact.folder import DESCRIPTION, write_agent
 from usm_agents.artifact.network import Network
 from usm_agents.learning.plan import PLAN
 from usm_gym.support.files import move_folder, naming, remove_folder, write_json
-from usm_gym.support.validation import in_one_line
+from usm_gym.support.validation import UsageError, in_one_line
 
 CURVE, STATE, MODEL, REPLAY = "curve.json", "state", "model.zip", "replay"
 PART = "checkpoint.part"
@@ -100,7 +100,7 @@ def read_checkpoint(
         assert vars(state).keys() == {field.name for field in fields(State)}
     except Exception as error:  # whatever becomes of the pickles of another version
         reason = f"{type(error).__name__}: {in_one_line(error)}"
-        raise ValueError(f"{checkpoint} is damaged, or of another version ({reason})") from error
+        raise UsageError(f"{checkpoint} is damaged, or of another version ({reason})") from error
     if memory is not None:
         model._last_lstm_states = memory  # type: ignore[attr-defined]
     python, numpy, torchs = chance

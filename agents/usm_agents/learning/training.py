@@ -47,7 +47,7 @@ from usm_gym.suites import unseen
 from usm_gym.support.files import holding
 from usm_gym.support.provenance import provenance
 from usm_gym.support.seeding import TRAINING, VALIDATION, stream
-from usm_gym.support.validation import require
+from usm_gym.support.validation import UsageError, require
 from usm_gym.task.conditions import FIELD
 
 # Held-out scenarios of the training distribution, the same for all trainings.
@@ -62,7 +62,7 @@ VALIDATED = ("max_error_x", "max_error_y", "thrust_variation")
 Report = Callable[[int, str], None]
 
 
-class DivergedError(ValueError):
+class DivergedError(UsageError):
     """A training that has diverged."""
 
 
