@@ -33,7 +33,7 @@ def test_an_evaluation(axes, tmp_path, monkeypatch, capsys):
     for axis in axes:
         assert f"error {axis}, mm" in text
         assert f'"label": "error in {axis}, mm"' in text
-    assert f"this result has {'a, b and c' if len(axes) == 3 else 'a'}" in text
+    assert f"this result is in {'a, b and c' if len(axes) == 3 else 'a'}" in text
     assert 'data-replay="' not in text
     assert "The best, pd, keeps it to 1.00 mm in a" in text
     capsys.readouterr()

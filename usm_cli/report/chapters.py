@@ -299,8 +299,8 @@ def replay(
     require(index < len(scenarios), "--scenario", index, f"0 to {len(scenarios) - 1}")
     title = f"Episode {index}, replayed"
     if axes and tuple(axes) != PLANE:
-        drawn = f"robots in the plane of {listed(PLANE)}; this result has {listed(axes)}"
-        return Facts(title, {"none": f"only {drawn}"})
+        plane = f"a replay draws a robot in the plane of {listed(PLANE)}"
+        return Facts("Replay", {"none": f"{plane}, and this result is in {listed(axes)}"})
     contenders, missing = able(rows, choice)
     scenario, done = scenarios[index], 0
 

@@ -7,12 +7,12 @@ import pytest
 import usm_agents  # noqa: F401 (registers them)
 import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
-from usm_baselines.benchmark.leaderboard import total
 
 import usm_gym
 from usm_gym.robot import Robot
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import Conditions
+from usm_gym.task.metrics import total_error
 from usm_gym.task.nominal import nominal_of
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
@@ -29,7 +29,7 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
         for id in (folder.name, agent.base)
     )
     assert not ours.failed.any()
-    assert total(ours).mean() < total(base).mean()
+    assert total_error(ours.per_episode).mean() < total_error(base.per_episode).mean()
     for axis in "xy":
         name = f"max_error_{axis}"
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]

@@ -6,8 +6,16 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import usm_baselines
+from support.results import PROVENANCE
 from usm_baselines.paper.paper_rate import Law, simulate
-from usm_baselines.paper.reproduction import PAPER, at_step, cases, run_cases, table
+from usm_baselines.paper.reproduction import (
+    PAPER,
+    STEP,
+    at_step,
+    cases,
+    reproduction,
+    run_cases,
+)
 
 from usm_gym.robot import Robot
 from usm_gym.task.scenario import named
@@ -96,9 +104,8 @@ def test_short_runs_are_the_same_bits_side_by_side_and_alone():
 
 def test_the_tables_of_the_paper_in_half_a_minute():
     """The bounds that the reproduction has to keep, from the one declared scenario."""
-    chosen = cases()
-    result = table(chosen, run_cases(chosen, 2, lambda: None))
-    rows, paper = result["rows"], PAPER
+    records = run_cases(cases(), 2, lambda: None)
+    rows, paper = reproduction(STEP, records, PROVENANCE).rows, PAPER
     for part, axes in paper["pd"].items():
         for axis, printed in axes.items():
             assert 0.5 < rows["pd"][part][axis] / printed < 2.0, (part, axis)
