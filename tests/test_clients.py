@@ -121,6 +121,7 @@ def test_the_table_has_these_clients():
     assert LINES.keys() == CLIENTS.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("client", CLIENTS)
 def test_the_line_of_a_client_works(client, tmp_path, monkeypatch):
     module, use = CLIENTS[client]

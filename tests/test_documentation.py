@@ -79,6 +79,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if any(blocks(page))], ids=lambda p: p.stem
 )
@@ -117,6 +118,7 @@ def test_every_law_has_its_place_among_the_controllers():
     assert {id.removesuffix("-tuned") for id in laws} == shown
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     commands = pytest.importorskip("mkdocs.commands.build")
     config = pytest.importorskip("mkdocs.config").load_config(

@@ -32,6 +32,7 @@ def test_it_is_stored_without_outputs(name):
             assert cell.execution_count is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHORT)
 def test_it_runs(name, tmp_path):
     notebook = read(name)

@@ -10,7 +10,6 @@ from typing import Any
 
 from usm_agents.policies import named
 from usm_baselines.benchmark.scoring import (
-    BATCH,
     TIME_LIMIT,
     Job,
     Refusal,
@@ -22,7 +21,7 @@ from usm_baselines.registry import entry, ids
 
 from usm_cli.options import add_computing, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
-from usm_gym.evaluation import Evaluation
+from usm_gym.evaluation import BATCH, Evaluation
 from usm_gym.robot import Robot
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json

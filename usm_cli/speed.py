@@ -26,9 +26,9 @@ from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import Count, Number, require, validated
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.nominal import nominal_of
+from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import Path as Track
-from usm_gym.task.scenario import Scenario, named, sample
+from usm_gym.task.scenario import Scenario
 
 ROBOTS = 256
 SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
@@ -165,7 +165,7 @@ def plant_timing(
     """
     body = robot or Robot()
     conditions = Conditions(control_period=period, current_limit=0.0)
-    simulation = Simulation(body, resting(size, conditions, body), threads)
+    simulation = Simulation(resting(size, conditions, body), threads)
     start = simulation.snapshot()
     action = np.zeros((size, len(body.thrusters)), np.float32)
 
@@ -181,7 +181,7 @@ def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
     """Sampled scenarios whose reference rests, so that robots are not lost without a controller."""
     scenarios = [
         replace(
-            sample("operation", conditions, stream(0, EVALUATION, i), robot.links - 1),
+            sample("operation", conditions, stream(0, EVALUATION, i), robot),
             path=HERE,
         )
         for i in range(min(size, 64))
@@ -293,7 +293,7 @@ def paper_rate() -> None:
 def evaluate_suite() -> None:
     """The operation suite by all six policies of the main job."""
     scenarios = suite("operation")
-    nominal = nominal_of(Robot(), scenarios[0])
+    nominal = scenarios[0].nominal
     for id in ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero"):
         evaluate(make(id, nominal), scenarios)
 
@@ -301,7 +301,7 @@ def evaluate_suite() -> None:
 def thousand_episodes() -> None:
     """A thousand sampled operation episodes of 40 s with the super-twisting controller."""
     scenarios = [sample("operation", Conditions(), stream(1, EVALUATION, i)) for i in range(1000)]
-    evaluate(make("sta", nominal_of(Robot(), scenarios[0])), scenarios)
+    evaluate(make("sta", scenarios[0].nominal), scenarios)
 
 
 def timed(job: Callable[[], object]) -> float:

@@ -10,10 +10,8 @@ from usm_baselines.contender import Contender
 
 from usm_gym.evaluation import Trajectory, rollout
 from usm_gym.rendering.picture import Picture, Recorder
-from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError, in_one_line
-from usm_gym.task.nominal import nominal_of
 from usm_gym.task.scenario import Scenario
 
 
@@ -58,7 +56,7 @@ def take(
     Raises:
         ValueError: If the policy cannot be made or fails to act.
     """
-    robot, recorder, wanted = Robot(), Recorder(), set(shown)
+    recorder, wanted = Recorder(), set(shown)
     seen: dict[int, Picture] = {}
     lost = False
 
@@ -70,9 +68,9 @@ def take(
             seen[count] = recorder.picture(simulation)
         lost |= bool(simulation.lost[0])
 
-    policy = contender.make(nominal_of(robot, scenario))
+    policy = contender.make(scenario.nominal)
     try:
-        (trajectory,) = rollout(policy, [scenario], robot, progress, watch)
+        (trajectory,) = rollout(policy, [scenario], progress, watch)
     except (Exception, SystemExit) as error:  # whatever a controller may do
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         raise UsageError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error

@@ -5,6 +5,7 @@ from importlib.metadata import version
 from usm_gym.dynamics import accelerations
 from usm_gym.evaluation import Evaluation, evaluate
 from usm_gym.linear_model import LinearModel, linearise
+from usm_gym.planar_world import PlanarWorld
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
 from usm_gym.suites import suite
@@ -18,6 +19,7 @@ __all__ = [
     "Inspection",
     "LinearModel",
     "Path",
+    "PlanarWorld",
     "Robot",
     "Scenario",
     "Thruster",

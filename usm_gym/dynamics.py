@@ -7,8 +7,10 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout
-from usm_gym.plant.chain import Body, accelerate_all
+from usm_gym.plant.chain import accelerate_all
+from usm_gym.plant.step import Plant
 from usm_gym.robot import Hydrodynamics, Robot
 from usm_gym.support.validation import UsageError, brief, real_array, require
 
@@ -70,19 +72,13 @@ def accelerations(
         "current": _vectors("current", current, 2),
     }
     batch, states = _broadcast(given)
-    body = Body(
-        l=robot.half_length,
-        m=robot.link_mass,
-        J=robot.link_inertia,
-        implicit=0.0,
-        kirchhoff=float(hydrodynamics == "consistent"),
-    )
+    plant = plant_of(robot, 0.0, hydrodynamics=hydrodynamics)
     size = len(states[0])
     theta_ddot, p_ddot = np.empty((size, n)), np.empty((size, 2))
     for first in range(0, size, CHUNK):
         part = slice(first, first + CHUNK)
-        blocks = _blocks(robot, *(state[part] for state in states))
-        accelerate_all(blocks, n, body)
+        blocks = _blocks(robot, plant, *(state[part] for state in states))
+        accelerate_all(blocks, n, plant)
         alpha = layout.row_of(layout.ALPHA, n)
         theta_ddot[part] = blocks[:, alpha : alpha + n]
         p_ddot[part] = blocks[:, layout.A_X : layout.A_Y + 1]
@@ -91,6 +87,7 @@ def accelerations(
 
 def _blocks(
     robot: Robot,
+    plant: Plant,
     theta: Array,
     theta_dot: Array,
     p_dot: Array,
@@ -99,19 +96,18 @@ def _blocks(
     current: Array,
 ) -> Array:
     n, size = robot.links, len(theta)
-    blocks = np.zeros((size, layout.rows(n, 0)))
+    blocks = np.tile(body_row(robot, plant), (size, 1))
     quantities = (size, layout.QUANTITIES, layout.padded(n))
-    links = blocks[:, layout.HEADER :].reshape(quantities)[:, :, :n]
+    of_links = blocks[:, layout.HEADER : layout.first_command(n)]
+    links = of_links.reshape(quantities)[:, :, :n]
     links[:, layout.THETA] = theta
     links[:, layout.OMEGA] = theta_dot
-    links[:, layout.SIDE] = layout.sides(n)
     links[:, layout.TORQUE, :-1] = joint_torques
     for j, thruster in enumerate(robot.thrusters):
         push = layout.PUSH_N if thruster.direction == "normal" else layout.PUSH_T
         links[:, push, thruster.link - 1] += thruster_forces[:, j]
     blocks[:, layout.V_X : layout.V_Y + 1] = p_dot
     blocks[:, layout.WATER_X : layout.WATER_Y + 1] = current
-    blocks[:, layout.C_T : layout.LAMBDA_3 + 1] = robot.hydrodynamic_coefficients
     return blocks
 
 

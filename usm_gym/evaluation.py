@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -10,29 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.envs.env import saturated
+from usm_gym.policy import as_action
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.statistics import mean_interval
 from usm_gym.support import parallel
 from usm_gym.support.validation import is_whole, require
 from usm_gym.task import metrics
-from usm_gym.task.observation import ObservationLayout
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.loss import LOST_ERROR
+from usm_gym.world import World, world_of
 
-AXES = ("x", "y")
+# Episodes that a policy meets side by side; a multiple of the plant's lanes.
+BATCH = 64
 # What side by side is kept of all episodes: some three gigabytes.
 MOST_SAMPLES = 50_000_000
-POSITION_METRICS = tuple(
-    f"{name}_{axis}" for name in ("max_error", "settled_error", "rms_error") for axis in AXES
-)
-METRICS = (
-    *POSITION_METRICS,
-    "heading_error",
-    "thrust_effort",
-    "thrust_variation",
-    "saturation_share",
-)
+# Of each axis.
+POSITION_METRICS = ("max_error", "settled_error", "rms_error")
+THRUST_METRICS = ("thrust_effort", "thrust_variation", "saturation_share")
+# The row of an episode that is no metric.
+FAILED = "failed"
 
 
 @dataclass(frozen=True)
@@ -42,16 +39,16 @@ class Trajectory:
     Attributes:
         scenario: The episode's scenario.
         time: Times, s, (samples,).
-        error: True position errors, m, (samples, 2).
-        heading_error: Heading errors, rad, (samples,).
+        error: True position errors, m, (samples, axes).
+        attitude_error: Attitude errors, rad, (samples, angles).
         command: Thruster commands after saturation, N, (samples, thrusters).
         lost: Whether the robot was lost.
     """
 
-    scenario: Scenario
+    scenario: Any
     time: NDArray[np.float64]
     error: NDArray[np.float64]
-    heading_error: NDArray[np.float64]
+    attitude_error: NDArray[np.float64]
     command: NDArray[np.float64]
     lost: bool
 
@@ -61,12 +58,17 @@ class Evaluation:
     """Scores of a policy, per episode in the order of the scenarios.
 
     Attributes:
-        per_episode: Values of each metric of `METRICS`, (episodes,).
+        per_episode: Values of each metric, as `metric_names` lists them, (episodes,).
         failed: Which episodes lost the robot, (episodes,).
     """
 
     per_episode: dict[str, NDArray[np.float64]]
     failed: NDArray[np.bool_]
+
+    @property
+    def total_error(self) -> NDArray[np.float64]:
+        """What policies are ranked by, m, (episodes,): see `metrics.total_error`."""
+        return np.asarray(metrics.total_error(self.per_episode))
 
     def summary(self) -> dict[str, Any]:
         """Mean with interval and worst episode of each metric, failures, and all episodes."""
@@ -84,7 +86,8 @@ def joined(parts: Sequence[Evaluation]) -> Evaluation:
     """Scores of one policy on one list of scenarios after the other."""
     return Evaluation(
         per_episode={
-            name: np.concatenate([part.per_episode[name] for part in parts]) for name in METRICS
+            name: np.concatenate([part.per_episode[name] for part in parts])
+            for name in parts[0].per_episode
         },
         failed=np.concatenate([part.failed for part in parts]),
     )
@@ -92,7 +95,7 @@ def joined(parts: Sequence[Evaluation]) -> Evaluation:
 
 def evaluate(
     policy: Any,
-    scenarios: Sequence[Scenario],
+    scenarios: Sequence[Any],
     *,
     robot: Robot | None = None,
     workers: int = 1,
@@ -101,11 +104,12 @@ def evaluate(
     """Score a policy on scenarios, each with its own noise.
 
     Args:
-        policy: Anything with `predict`; it is called with a batch axis. To be pickled for more than
-            one worker. One with `privileged = True` is also given `snapshot=`, the true state. What
-            was trained on the residual task goes in as `usm_agents.ResidualPolicy(env, model)`.
+        policy: Anything with `predict` (`usm_gym.policy.Policy`); it is called with a batch axis.
+            To be pickled for more than one worker. One with `privileged = True` is also given
+            `snapshot=`, the true state. What was trained on the residual task goes in as
+            `usm_agents.ResidualPolicy(env, model)`.
         scenarios: The episodes.
-        robot: The robot; without one, the paper's.
+        robot: The robot that carries them out; without one, that which each scenario names.
         workers: Number of processes; without effect on the result, unless the policy's answer to
             a row depends on the other rows, as torch's does in its last bits.
         progress: Called now and then with the number of episodes done since the last call; with
@@ -119,117 +123,161 @@ def evaluate(
             is no action.
     """
     listed = isinstance(scenarios, Sequence) and len(scenarios) > 0
-    valid = listed and all(isinstance(each, Scenario) for each in scenarios)
+    valid = listed and all(hasattr(scenario, "body") for scenario in scenarios)
     require(valid, "scenarios", scenarios, "a list of one Scenario or more")
     require(is_whole(workers, 1), "workers", workers, "1 or more")
     report = progress or (lambda episodes: None)
-    body = robot or Robot()
-    _require_fit(policy, body)
+    if robot is not None:
+        scenarios = [dataclasses.replace(scenario, robot=robot) for scenario in scenarios]
     for scenario in scenarios:
-        score(_at_rest(scenario, body))  # refuses an episode that leaves nothing to score
+        _require_fit(policy, scenario)
+        score(_at_rest(scenario))  # refuses an episode that leaves nothing to score
+    chunks = [scenarios[part] for part in batches(len(scenarios), workers)]
     if workers == 1:
-        rows = [score(each) for each in rollout(policy, scenarios, body, report)]
+        rows = [row for chunk in chunks for row in _scores(policy, chunk, report)]
     else:
-        size = -(-len(scenarios) // workers)
-        chunks = [scenarios[i : i + size] for i in range(0, len(scenarios), size)]
         done = {}
-        for index, part in parallel.results(
-            _score_all, [(policy, chunk, body) for chunk in chunks], workers
-        ):
+        tasks = [(policy, chunk) for chunk in chunks]
+        for index, part in parallel.results(_scores, tasks, workers):
             done[index] = part
             report(len(part))
         rows = [row for index in sorted(done) for row in done[index]]
     return Evaluation(
-        per_episode={name: np.array([row[name] for row in rows]) for name in METRICS},
-        failed=np.array([bool(row["failed"]) for row in rows]),
+        per_episode={
+            name: np.array([row[name] for row in rows]) for name in rows[0] if name != FAILED
+        },
+        failed=np.array([bool(row[FAILED]) for row in rows]),
     )
+
+
+def batches(episodes: int, workers: int = 1) -> list[slice]:
+    """Which episodes a policy meets side by side: a batch, or what each worker gets if less."""
+    size = min(BATCH, -(-episodes // workers))
+    return [slice(first, min(first + size, episodes)) for first in range(0, episodes, size)]
 
 
 def rollout(
     policy: Any,
-    scenarios: Sequence[Scenario],
-    robot: Robot,
+    scenarios: Sequence[Any],
     progress: Callable[[float], None] = lambda episodes: None,
     watch: Callable[[Simulation], None] = lambda simulation: None,
 ) -> list[Trajectory]:
-    """Run a policy through scenarios, side by side as far as their timing agrees.
+    """Run a policy through scenarios, side by side as far as robot and timing agree.
 
     `watch` is called with each simulation at its start and after each step.
     """
     trajectories: dict[int, Trajectory] = {}
-    order = sorted(range(len(scenarios)), key=lambda i: (scenarios[i].conditions.timing, i))
-    for _, group in groupby(order, key=lambda i: scenarios[i].conditions.timing):
+
+    def kind(index: int) -> tuple[str, Any]:
+        return repr(scenarios[index].body), scenarios[index].conditions.timing
+
+    order = sorted(range(len(scenarios)), key=lambda index: (kind(index), index))
+    for _, group in groupby(order, key=kind):
         indices = list(group)
-        batch = [scenarios[i] for i in indices]
-        trajectories.update(zip(indices, _run(policy, batch, robot, progress, watch), strict=True))
-    return [trajectories[i] for i in range(len(scenarios))]
+        batch = [scenarios[index] for index in indices]
+        trajectories.update(zip(indices, _run(policy, batch, progress, watch), strict=True))
+    return [trajectories[index] for index in range(len(scenarios))]
+
+
+def metric_names(world: World) -> list[str]:
+    """Names of the metrics of an episode in a world, in the order of results."""
+    position = [f"{name}_{axis}" for name in POSITION_METRICS for axis in world.axes]
+    return [*position, *(f"{angle}_error" for angle in world.attitude), *THRUST_METRICS]
 
 
 def score(trajectory: Trajectory) -> dict[str, float | bool]:
-    """The metrics of an episode; a lost one counts as at least 0.5 m in both axes."""
+    """The metrics of an episode; a lost one counts as at least 0.5 m in all axes."""
     scenario, time, error = trajectory.scenario, trajectory.time, trajectory.error
-    settle = scenario.settle_time
+    world, settle = world_of(scenario.body), scenario.settle_time
+    names = metric_names(world)[: len(POSITION_METRICS) * len(world.axes)]
+    row: dict[str, float | bool]
     if trajectory.lost:
-        largest = max(metrics.LOST_ERROR, float(np.abs(error).max()))
-        row = dict.fromkeys(POSITION_METRICS, largest)
-        heading = np.abs(trajectory.heading_error).max()
+        row = dict.fromkeys(names, max(LOST_ERROR, float(np.abs(error).max())))
+        counted = np.ones(len(time), bool)
     else:
-        values = np.concatenate(
-            [
-                metrics.max_error(time, error, settle),
-                metrics.settled_error(time, error, scenario.shifts, settle),
-                metrics.rms_error(time, error, settle),
-            ]
-        )
-        row = dict(zip(POSITION_METRICS, values.tolist(), strict=True))
-        heading = np.abs(trajectory.heading_error[time >= settle]).max()
+        values = [
+            metrics.max_error(time, error, settle),
+            metrics.settled_error(time, error, scenario.shifts, settle),
+            metrics.rms_error(time, error, settle),
+        ]
+        row = dict(zip(names, np.concatenate(values).tolist(), strict=True))
+        counted = time >= settle
+    for k, angle in enumerate(world.attitude):
+        row[f"{angle}_error"] = float(np.abs(trajectory.attitude_error[counted, k]).max())
     period, limit = scenario.conditions.control_period, scenario.conditions.thruster_limit
-    return {
-        **row,
-        "heading_error": float(heading),
+    return row | {
         "thrust_effort": metrics.thrust_effort(trajectory.command),
         "thrust_variation": metrics.thrust_variation(trajectory.command, period),
         "saturation_share": metrics.saturation_share(trajectory.command, limit),
-        "failed": trajectory.lost,
+        FAILED: trajectory.lost,
     }
+
+
+class _Recording:
+    """What happens in a simulation, up to the end or the loss of each robot."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Make room for all control periods."""
+        size, length = simulation.size, int(simulation.steps.max())
+        require(
+            size * length <= MOST_SAMPLES,
+            "scenarios",
+            f"{size} episodes of up to {length} control periods",
+            f"{MOST_SAMPLES} control periods side by side",
+        )
+        self.length = length
+        self.lost = np.zeros(size, bool)
+        self._simulation = simulation
+        self._ends = simulation.steps.copy()
+        self._error = np.empty((length, *simulation.error.shape))
+        self._attitude_error = np.empty((length, *simulation.attitude_error.shape))
+        self._command = np.empty((length, size, simulation.world.thrusters))
+
+    def alive(self, period: int) -> NDArray[np.bool_]:
+        """Whose episodes are going on in a control period."""
+        return (period < self._ends) & ~self.lost
+
+    def note(self, period: int) -> None:
+        """Take down a control period that has just passed."""
+        simulation = self._simulation
+        self._error[period] = simulation.error
+        self._attitude_error[period] = simulation.attitude_error
+        self._command[period] = simulation.read("command")
+        now = simulation.lost & self.alive(period)
+        self._ends[now] = period + 1
+        self.lost |= now
+
+    def trajectories(self) -> list[Trajectory]:
+        """The episodes."""
+        scenarios = self._simulation.scenarios
+        return [
+            Trajectory(
+                scenario=scenario,
+                time=_times(scenario, int(end)),
+                error=self._error[:end, index],
+                attitude_error=self._attitude_error[:end, index],
+                command=self._command[:end, index],
+                lost=bool(self.lost[index]),
+            )
+            for index, (scenario, end) in enumerate(zip(scenarios, self._ends, strict=True))
+        ]
 
 
 def _run(
     policy: Any,
-    scenarios: Sequence[Scenario],
-    robot: Robot,
+    scenarios: Sequence[Any],
     progress: Callable[[float], None],
     watch: Callable[[Simulation], None],
 ) -> list[Trajectory]:
-    size, thrusters = len(scenarios), len(robot.thrusters)
-    length = max(scenario.steps for scenario in scenarios)
-    require(
-        size * length <= MOST_SAMPLES,
-        "scenarios",
-        f"{size} episodes of up to {length} control periods",
-        f"{MOST_SAMPLES} control periods side by side",
-    )
-    simulation = Simulation(robot, scenarios)
+    """Run a policy through scenarios side by side."""
+    _require_period(policy, scenarios[0].conditions.control_period)
+    simulation = Simulation(scenarios)
     watch(simulation)
-    error = np.empty((length, size, 2))
-    heading = np.empty((length, size))
-    command = np.empty((length, size, thrusters))
-    ends = simulation.steps.copy()
-    lost = np.zeros(size, bool)
+    recording, size = _Recording(simulation), simulation.size
     state: Any = None
-    known = getattr(policy, "nominal", None)
-    period = scenarios[0].conditions.control_period
-    if known is not None:
-        require(
-            known.control_period == period,
-            "control_period",
-            period,
-            f"that for which the policy was made, {known.control_period}",
-        )
-    for k in range(length):
+    for k in range(recording.length):
         truth = {"snapshot": simulation.snapshot()} if getattr(policy, "privileged", False) else {}
-        start = np.full(size, k == 0)
-        seen = simulation.observation.copy()
+        start, seen = np.full(size, k == 0), simulation.observation.copy()
         answer = policy.predict(seen, state, start, deterministic=True, **truth)
         require(
             isinstance(answer, tuple) and len(answer) == 2,
@@ -238,40 +286,34 @@ def _run(
             "a pair (action, state)",
         )
         state = answer[1]
-        action = saturated(answer[0], (size, thrusters))
-        alive = (k < ends) & ~lost
+        action = as_action(answer[0], (size, simulation.world.thrusters))
         missing = np.isnan(action)
-        require(not missing[alive].any(), "the policy's action", "NaN", "numbers")
+        require(not missing[recording.alive(k)].any(), "the policy's action", "NaN", "numbers")
         simulation.step(np.where(missing, np.float32(0.0), action))
         watch(simulation)
-        error[k], heading[k] = simulation.error, simulation.heading_error
-        command[k] = simulation.command
-        now = simulation.lost & alive
-        ends[now] = k + 1
-        lost |= now
-        if k % 100 == 99 or k == length - 1:
-            progress(size * (k % 100 + 1) / length)
-            if lost.all():
-                progress(size * (length - 1 - k) / length)
+        recording.note(k)
+        if k % 100 == 99 or k == recording.length - 1:
+            progress(size * (k % 100 + 1) / recording.length)
+            if recording.lost.all():
+                progress(size * (recording.length - 1 - k) / recording.length)
                 break
-    return [
-        Trajectory(
-            scenario=scenario,
-            time=np.arange(1, end + 1, dtype=np.float64) * period,
-            error=error[:end, i],
-            heading_error=heading[:end, i],
-            command=command[:end, i],
-            lost=bool(lost[i]),
-        )
-        for i, (scenario, end) in enumerate(zip(scenarios, ends, strict=True))
-    ]
+    return recording.trajectories()
 
 
-def _require_fit(policy: Any, robot: Robot) -> None:
+def _require_period(policy: Any, period: float) -> None:
+    """Refuse a policy that was made for another control period."""
+    known = getattr(policy, "nominal", None)
+    if known is not None:
+        own = known.control_period
+        allowed = f"that for which the policy was made, {own}"
+        require(own == period, "control_period", period, allowed)
+
+
+def _require_fit(policy: Any, scenario: Any) -> None:
     """Refuse a model that was trained on another observation, such as the residual task's."""
     space = getattr(policy, "observation_space", None)
-    shape = ObservationLayout(robot.links, len(robot.thrusters)).space.shape
     if space is not None:
+        shape = world_of(scenario.body).layout.space.shape
         require(
             space.shape == shape,
             "the shape of the policy's observation",
@@ -281,19 +323,27 @@ def _require_fit(policy: Any, robot: Robot) -> None:
         )
 
 
-def _at_rest(scenario: Scenario, robot: Robot) -> Trajectory:
-    samples = scenario.steps
+def _at_rest(scenario: Any) -> Trajectory:
+    samples, world = scenario.steps, world_of(scenario.body)
     return Trajectory(
         scenario=scenario,
-        time=np.arange(1, samples + 1, dtype=np.float64) * scenario.conditions.control_period,
-        error=np.zeros((samples, 2)),
-        heading_error=np.zeros(samples),
-        command=np.zeros((samples, len(robot.thrusters))),
+        time=_times(scenario, samples),
+        error=np.zeros((samples, len(world.axes))),
+        attitude_error=np.zeros((samples, len(world.attitude))),
+        command=np.zeros((samples, world.thrusters)),
         lost=False,
     )
 
 
-def _score_all(
-    policy: Any, scenarios: Sequence[Scenario], robot: Robot
+def _times(scenario: Any, samples: int) -> NDArray[np.float64]:
+    """The ends of the first control periods of an episode, s."""
+    period: float = scenario.conditions.control_period
+    return np.arange(1, samples + 1, dtype=np.float64) * period
+
+
+def _scores(
+    policy: Any,
+    scenarios: Sequence[Any],
+    progress: Callable[[float], None] = lambda episodes: None,
 ) -> list[dict[str, float | bool]]:
-    return [score(each) for each in rollout(policy, scenarios, robot)]
+    return [score(trajectory) for trajectory in rollout(policy, scenarios, progress)]

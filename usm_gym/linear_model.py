@@ -155,8 +155,10 @@ def _at_rest(nominal: Nominal, theta: Array, joint_angles: Array) -> Simulation:
         position_noise=0.0,
     )
     unfiltered = replace(STILL, filter_frequency=None)
-    scenario = Scenario(inspection=unfiltered, conditions=conditions, duration=period)
-    simulation = Simulation(nominal.robot, [scenario])
+    scenario = Scenario(
+        inspection=unfiltered, conditions=conditions, duration=period, robot=nominal.robot
+    )
+    simulation = Simulation([scenario])
     row = simulation.fleet.blocks[0]
     row[rows.row_of(rows.THETA, links) :][:links] = theta
     # Each joint's reference is its share of a deflection of 1, which a filter of gain 1 holds.
@@ -170,17 +172,10 @@ def _differences(simulation: Simulation) -> tuple[Array, Array]:
 
     The state is the plant's: position and link angles, their rates, the thrusters' forces.
     """
-    links, thrusters = simulation.robot.links, len(simulation.robot.thrusters)
+    thrusters, quantities = simulation.world.thrusters, simulation.world.quantities
     row, start = simulation.fleet.blocks[0], simulation.snapshot()
-    place = np.concatenate(
-        [
-            [rows.P_X, rows.P_Y],
-            rows.row_of(rows.THETA, links) + np.arange(links),
-            [rows.V_X, rows.V_Y],
-            rows.row_of(rows.OMEGA, links) + np.arange(links),
-            rows.first_command(links) + thrusters + np.arange(thrusters),
-        ]
-    )
+    names = ("position", "theta", "velocity", "theta_dot", "force")
+    place = np.concatenate([quantities[name] for name in names])
 
     def after(deviation: Array) -> Array:
         simulation.restore(start)

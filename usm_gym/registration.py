@@ -12,7 +12,7 @@ def register_environments() -> None:
     for mode in MODES:
         gym.register(
             id=f"USM-{mode.capitalize()}-v0",
-            entry_point="usm_gym.envs.env:USMEnv",
-            vector_entry_point="usm_gym.envs.vector_env:USMVectorEnv",
+            entry_point="usm_gym.envs.usm:USMEnv",
+            vector_entry_point="usm_gym.envs.usm:USMVectorEnv",
             kwargs={"mode": mode},
         )

@@ -214,15 +214,13 @@ class Robot:
         return np.stack([~normal, normal, normal * position]).astype(np.float64)
 
 
-def robot_of(value: Mapping[str, Any] | Robot | None) -> Robot:
+def read_robot(fields: Mapping[str, Any]) -> Robot:
     """Make a robot from the fields that differ from the paper's.
 
     Raises:
         ValueError: If a field is unknown or its value not allowed.
     """
-    if isinstance(value, Robot):
-        return value
-    return build(_ADAPTER, "robot", {} if value is None else value)
+    return build(_ADAPTER, "robot", fields)
 
 
 _ADAPTER = TypeAdapter(Robot)

@@ -9,21 +9,21 @@ from typing import Any
 
 from usm_baselines.gains import TUNED, GainsFile, read_gains
 from usm_baselines.laws.generalised_super_twisting import (
-    ADAPTIVE_SPACE,
-    GENERALISED_SPACE,
     AdaptiveGeneralisedSuperTwisting,
     GeneralisedSuperTwisting,
 )
-from usm_baselines.laws.ladrc import LADRC, LADRC_SPACE
-from usm_baselines.laws.lqg import JOINT_LQG_SPACE, LQG, LQG_SPACE, JointLQG
-from usm_baselines.laws.mpc import MPC, MPC_SPACE
+from usm_baselines.laws.joint_lqg import JointLQG
+from usm_baselines.laws.ladrc import LADRC
+from usm_baselines.laws.lqg import LQG
+from usm_baselines.laws.mpc import MPC
 from usm_baselines.laws.oracle import Oracle
-from usm_baselines.laws.pd import PD, PD_SPACES
-from usm_baselines.laws.pid import PID, PID_SPACE
-from usm_baselines.laws.sliding_mode import SLIDING_MODE_SPACE, SlidingMode
-from usm_baselines.laws.super_twisting import SUPER_TWISTING_SPACE, SuperTwisting
+from usm_baselines.laws.pd import PD, SPACES
+from usm_baselines.laws.pid import PID
+from usm_baselines.laws.sliding_mode import SlidingMode
+from usm_baselines.laws.super_twisting import SuperTwisting
 from usm_baselines.laws.zero import Zero
-from usm_baselines.space import Space
+from usm_baselines.policy import ScriptedPolicy
+from usm_baselines.space import Space, space_of
 from usm_gym.policy import Policy
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
@@ -67,7 +67,8 @@ def register(
         factory: `factory(nominal, **gains)` returns an object with `predict`; it is given
             `env.unwrapped.nominal` and no more of the environment.
         summary: What it is, in a line.
-        space: The gains that are tuned, by name, and where; without it, none are.
+        space: The gains that are tuned, by name, and where; without it, as the `Gains` of a
+            `ScriptedPolicy` declare, and none of another factory.
         slow: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state.
 
@@ -75,10 +76,18 @@ def register(
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
-    _entries[id] = Entry(factory, summary, space or {}, slow, privileged)
+    chosen = _declared_space(factory) if space is None else space
+    _entries[id] = Entry(factory, summary, chosen, slow, privileged)
     shipped = TUNED / f"{id}.json"
     if shipped.is_file():
         _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
+
+
+def _declared_space(factory: Any) -> Space:
+    while isinstance(factory, partial):
+        factory = factory.func
+    law = isinstance(factory, type) and issubclass(factory, ScriptedPolicy)
+    return space_of(factory.Gains) if law else {}
 
 
 def tuned(file: GainsFile) -> Entry:
@@ -131,81 +140,62 @@ def make(id: str, env: Any, **gains: Any) -> Policy:
 
 
 def nominal_knowledge(env: Any) -> Nominal:
-    """The nominal knowledge of an environment, whatever it is wrapped in."""
+    """The nominal knowledge of an environment, whatever it is wrapped in.
+
+    Raises:
+        ValueError: If it is not one of this package, or its robots do not share their knowledge.
+    """
     if isinstance(env, Nominal):
         return env
     inner = getattr(env, "unwrapped", env)
     if hasattr(inner, "nominal"):
-        nominal = inner.nominal
+        known = [inner.nominal]
     else:
         require(hasattr(inner, "get_attr"), "env", env, "an environment of this package")
-        nominal = inner.get_attr("nominal")[0]
-    require(isinstance(nominal, Nominal), "env", env, "an environment of this package")
-    known: Nominal = nominal
-    return known
+        known = list(inner.get_attr("nominal"))
+    valid = all(isinstance(nominal, Nominal) for nominal in known)
+    require(valid, "env", env, "an environment of this package")
+    kinds = f"{len(set(known))} kinds"
+    require(len(set(known)) == 1, "nominal knowledge", kinds, "one of all robots")
+    nominal: Nominal = known[0]
+    return nominal
 
 
-register(
-    "sta",
-    SuperTwisting,
-    "adaptive super-twisting (10)-(20), the paper's gains, implicit",
-    space=SUPER_TWISTING_SPACE,
-)
+register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
 register(
     "sta-explicit",
     partial(SuperTwisting, implicit=False),
     "the same by Euler's forward method, as the paper has it",
+    space={},
 )
-register("pd", PD, "PD (21) as a force, the paper's gains", space=PD_SPACES["force"])
+register("pd", PD, "PD (21) as a force, the paper's gains")
 register(
     "pd-mass",
     partial(PD, reading="mass"),
     "PD (21) times the mass, with feedforward",
-    space=PD_SPACES["mass"],
+    space=SPACES["mass"],
 )
 register(
     "pd-observer",
     partial(PD, reading="observer"),
     "PD (21) in the place of u_STA in (19), the paper's words to the letter",
-    space=PD_SPACES["observer"],
+    space=SPACES["observer"],
 )
-register("pid", PID, "PID, filtered derivative, anti-windup", space=PID_SPACE)
+register("pid", PID, "PID, filtered derivative, anti-windup")
 register(
     "ladrc",
     LADRC,
     "linear active-disturbance rejection: extended-state observer and pole placement",
-    space=LADRC_SPACE,
 )
 register(
-    "lqg",
-    LQG,
-    "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
-    space=LQG_SPACE,
+    "lqg", LQG, "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag"
 )
+register("lqg-joints", JointLQG, "the same with the joint motion foreseen by the nominal plant")
+register("mpc", MPC, "predictive control on the nominal plant, joint motion known")
+register("smc", SlidingMode, "sliding mode with boundary layer and integral action")
+register("gsta", GeneralisedSuperTwisting, "generalised super-twisting on the paper's observer")
 register(
-    "lqg-joints",
-    JointLQG,
-    "the same with the joint motion foreseen by the nominal plant",
-    space=JOINT_LQG_SPACE,
-)
-register("mpc", MPC, "predictive control on the nominal plant, joint motion known", space=MPC_SPACE)
-register(
-    "smc",
-    SlidingMode,
-    "sliding mode with boundary layer and integral action",
-    space=SLIDING_MODE_SPACE,
-)
-register(
-    "gsta",
-    GeneralisedSuperTwisting,
-    "generalised super-twisting on the paper's observer",
-    space=GENERALISED_SPACE,
-)
-register(
-    "agsta",
-    AdaptiveGeneralisedSuperTwisting,
-    "the same with the paper's adaptation of its gains",
-    space=ADAPTIVE_SPACE,
+    "agsta", AdaptiveGeneralisedSuperTwisting, "the same with the paper's adaptation of its gains"
 )
 register("oracle", Oracle, "the limit: true state, exact plant, the future", privileged=True)
 register("zero", Zero, "no thrust")

@@ -1,7 +1,7 @@
 """What control laws work with: from the observation to signals, from a wrench to the action.
 
 A law sees the tracking error, the applied force and the reference, and answers with a force on the
-centre of mass; heading control and thruster allocation are the same for all.
+centre of mass; attitude control and thruster allocation are the same for all.
 """
 
 from __future__ import annotations
@@ -11,22 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.kernels.compile import compiled
-from usm_gym.kernels.elementary import sincos
-from usm_gym.plant.measure import (
-    HEADING_ERROR,
-    JOINT_ANGLES,
-    POSITION_ERROR,
-    REFERENCE_ACCELERATION,
-    REFERENCE_VELOCITY,
-    TAIL_ANGLE,
-    THRUSTER_COMMAND,
-    THRUSTER_LIMIT,
-    value,
-)
-from usm_gym.plant.thrusters import allocate, allocation_matrix
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.plant.thrusters import allocate
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.observation import ObservationLayout
+from usm_gym.world import World, world_of
 
 Array = NDArray[np.float64]
 
@@ -35,26 +23,32 @@ class Model(NamedTuple):
     """Nominal knowledge in the form that kernels take.
 
     Attributes:
-        starts: First index of each entry of the observation.
-        scale: Physical value over observed value of each number.
-        axes: Number of axes in which the position is controlled.
-        links: Number of links.
-        l: Half the length of a link, m.
-        thruster_links: Zero-based link of each thruster.
-        thruster_is_normal: Whether each thruster pushes across its link.
-        mass: Total mass m_t, kg.
+        axes: Axes in which the position is controlled.
+        angles: Angles of the attitude that are controlled.
+        thrusters: Number of thrusters.
+        mass: Mass of the robot, kg.
         h: Control period, s.
+        scale: Physical value over observed value of each number of the observation.
+        position_error: Index of the first number of an entry of the observation.
+        reference_velocity: The same.
+        reference_acceleration: The same.
+        attitude_error: The same.
+        thruster_command: The same.
+        thruster_limit: The same.
     """
 
-    starts: NDArray[np.int64]
-    scale: Array
     axes: int
-    links: int
-    l: float
-    thruster_links: NDArray[np.int64]
-    thruster_is_normal: NDArray[np.bool_]
+    angles: int
+    thrusters: int
     mass: float
     h: float
+    scale: Array
+    position_error: int
+    reference_velocity: int
+    reference_acceleration: int
+    attitude_error: int
+    thruster_command: int
+    thruster_limit: int
 
 
 class Signals(NamedTuple):
@@ -62,12 +56,12 @@ class Signals(NamedTuple):
 
     Attributes:
         started: 0.0 at the first call of an episode, else 1.0, (batch,).
-        y: Measured position error, m, (batch, 2).
-        u: Applied force over the mass less the reference's acceleration, m/s^2, (batch, 2).
-        velocity: Velocity of the reference, m/s, (batch, 2).
-        acceleration: Acceleration of the reference, m/s^2, (batch, 2).
-        allocation: Allocation matrices, (batch, 3, thrusters).
-        observation: All that is measured, to be read with `value`, (batch, numbers).
+        y: Measured position error, m, (batch, axes).
+        u: Applied force over the mass less the reference's acceleration, m/s^2, (batch, axes).
+        velocity: Velocity of the reference, m/s, (batch, axes).
+        acceleration: Acceleration of the reference, m/s^2, (batch, axes).
+        allocation: Allocation matrices, (batch, axes + angles, thrusters).
+        observation: All that is measured, (batch, numbers).
     """
 
     started: Array
@@ -81,19 +75,37 @@ class Signals(NamedTuple):
 
 def model_of(nominal: Nominal) -> Model:
     """The nominal knowledge for kernels."""
-    robot = nominal.robot
-    layout = ObservationLayout(robot.links, len(robot.thrusters))
+    world = world_of(nominal.robot)
+    layout = world.layout
+    first = {name: place.start for name, place in layout.slices.items()}
+    angles = [f"{angle}_error" for angle in world.attitude]
     return Model(
-        starts=layout.starts,
-        scale=layout.scale,
-        axes=2,
-        links=robot.links,
-        l=robot.half_length,
-        thruster_links=robot.thruster_links,
-        thruster_is_normal=robot.thruster_is_normal,
-        mass=robot.total_mass,
+        axes=len(world.axes),
+        angles=len(angles),
+        thrusters=world.thrusters,
+        mass=world.mass,
         h=nominal.control_period,
+        scale=layout.scale,
+        position_error=first["position_error"],
+        reference_velocity=first["reference_velocity"],
+        reference_acceleration=first["reference_acceleration"],
+        attitude_error=first[angles[0]] if angles else layout.size,
+        thruster_command=first["thruster_command"],
+        thruster_limit=first["thruster_limit"],
     )
+
+
+@piece
+def physical(observation, model, index):
+    """One number of an observation in its physical unit."""
+    return observation[index] * model.scale[index]
+
+
+@piece
+def commanded(observation, model, thruster):
+    """Last command of a thruster after saturation, N."""
+    limit = physical(observation, model, model.thruster_limit)
+    return physical(observation, model, model.thruster_command + thruster) * limit
 
 
 @compiled
@@ -103,51 +115,49 @@ def sense(state, model, signals):
     The applied force is the last command after saturation, projected with the link angles at the
     time of that command, which the state has kept.
     """
-    thrusters = model.thruster_links.size
-    sine, cosine = np.empty(model.links), np.empty(model.links)
     for b in range(signals.observation.shape[0]):
         seen = signals.observation[b]
         signals.started[b] = state[b, 0]
-        limit = value(seen, model, THRUSTER_LIMIT, 0)
-        for axis in range(2):
+        for axis in range(model.axes):
             force = 0.0
-            for j in range(thrusters):
-                command = value(seen, model, THRUSTER_COMMAND, j) * limit
-                force += state[b, 1 + axis * thrusters + j] * command
-            acceleration = value(seen, model, REFERENCE_ACCELERATION, axis)
-            signals.y[b, axis] = value(seen, model, POSITION_ERROR, axis)
-            signals.velocity[b, axis] = value(seen, model, REFERENCE_VELOCITY, axis)
+            for j in range(model.thrusters):
+                force += state[b, 1 + axis * model.thrusters + j] * commanded(seen, model, j)
+            acceleration = physical(seen, model, model.reference_acceleration + axis)
+            signals.y[b, axis] = physical(seen, model, model.position_error + axis)
+            signals.velocity[b, axis] = physical(seen, model, model.reference_velocity + axis)
             signals.acceleration[b, axis] = acceleration
             signals.u[b, axis] = force / model.mass - acceleration
-        theta = value(seen, model, TAIL_ANGLE, 0)
-        sine[0], cosine[0] = sincos(theta)
-        for i in range(model.links - 1):
-            theta -= value(seen, model, JOINT_ANGLES, i)
-            sine[i + 1], cosine[i + 1] = sincos(theta)
-        T = signals.allocation[b]
-        allocation_matrix(sine, cosine, model.l, model.thruster_links, model.thruster_is_normal, T)
 
 
 @compiled
-def act(observation, state, model, allocation, force, heading_gain, action):
-    """Fill in the actions that make the forces (N) and a proportional heading moment."""
-    thrusters = model.thruster_links.size
-    forces = np.empty(thrusters)
+def act(observation, state, model, allocation, force, attitude_gain, action):
+    """Fill in the actions that make the forces (N) and proportional moments on the attitude."""
+    rows = model.axes + model.angles
+    forces, wrench, work = np.empty(model.thrusters), np.empty(rows), np.empty((2 * rows + 1, rows))
     for b in range(observation.shape[0]):
         seen, T = observation[b], allocation[b]
-        moment = -heading_gain * value(seen, model, HEADING_ERROR, 0)
-        allocate(T, force[b, 0], force[b, 1], moment, forces)
-        limit = value(seen, model, THRUSTER_LIMIT, 0)
+        wrench[: model.axes] = force[b]
+        for i in range(model.angles):
+            angle_error = physical(seen, model, model.attitude_error + i)
+            wrench[model.axes + i] = -attitude_gain * angle_error
+        allocate(T, wrench, rows, work, forces)
+        limit = physical(seen, model, model.thruster_limit)
         state[b, 0] = 1.0
-        for j in range(thrusters):
+        for j in range(model.thrusters):
             action[b, j] = forces[j] / limit
-            state[b, 1 + j] = T[0, j]
-            state[b, 1 + thrusters + j] = T[1, j]
+            for axis in range(model.axes):
+                state[b, 1 + axis * model.thrusters + j] = T[axis, j]
 
 
-def room_for_signals(observation: NDArray[np.float32], thrusters: int) -> Signals:
-    """Signals of a batch that `sense` has to fill in."""
+def shared_size(model: Model) -> int:
+    """How many numbers of a policy's state `sense` and `act` keep, before the law's own."""
+    return 1 + model.axes * model.thrusters
+
+
+def signals_of(observation: NDArray[np.float32], model: Model, world: World) -> Signals:
+    """Signals of a batch, of which `sense` fills in all but the allocation."""
     size = len(observation)
-    y, u, velocity, acceleration = np.empty((4, size, 2))
-    allocation = np.empty((size, 3, thrusters))
+    y, u, velocity, acceleration = np.empty((4, size, model.axes))
+    allocation = np.empty((size, model.axes + model.angles, model.thrusters))
+    world.allocate(observation, allocation)
     return Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)

@@ -1,9 +1,10 @@
-"""Ranges of gains, declared beside each law and read by the tuner."""
+"""Gains as a law declares them, and the space in which they are tuned."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 from usm_gym.support.validation import require
 
@@ -31,3 +32,59 @@ class Range:
 
 
 Space = Mapping[str, Range]
+
+
+class Gain(float):
+    """The default of a gain, and what else there is to say of it.
+
+    A law's gains are a `NamedTuple` with one of these for each:
+
+        k_p: float = Gain(1300.0, "N/m", "proportional gain", tuned=(30.0, 30000.0))
+
+    In computations it is the number, and its copies and pickles are plain numbers.
+
+    Attributes:
+        unit: Unit of the gain.
+        meaning: What it is.
+        tuned: Where it is tuned, on a logarithmic scale; None if it is not.
+        positive: Whether it has to be larger than 0.
+    """
+
+    unit: str
+    meaning: str
+    tuned: Range | None
+    positive: bool
+
+    def __new__(
+        cls,
+        default: float,
+        unit: str,
+        meaning: str,
+        *,
+        tuned: tuple[float, float] | None = None,
+        positive: bool = False,
+    ) -> Self:
+        """Declare a gain; `tuned` has its smallest and its largest value."""
+        gain = super().__new__(cls, default)
+        gain.unit, gain.meaning, gain.positive = unit, meaning, positive
+        gain.tuned = None if tuned is None else Range(*tuned, unit)
+        return gain
+
+    def __reduce__(self) -> tuple[type[float], tuple[float]]:
+        return float, (float(self),)
+
+
+def declared(gains: type[Any]) -> dict[str, Gain]:
+    """The declarations in a `NamedTuple` of gains, by name."""
+    return {name: gains._field_defaults[name] for name in gains._fields}
+
+
+def space_of(gains: type[Any], **others: Range) -> Space:
+    """Where the gains of a `NamedTuple` are tuned, in its order.
+
+    Args:
+        gains: The `NamedTuple`.
+        others: Ranges in the place of those declared, by name.
+    """
+    ranges = {name: others.get(name, gain.tuned) for name, gain in declared(gains).items()}
+    return {name: each for name, each in ranges.items() if each is not None}

@@ -9,7 +9,6 @@ from usm_baselines.contender import contender
 
 import usm_gym
 from usm_gym.evaluation import rollout
-from usm_gym.task.nominal import nominal_of
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -48,8 +47,8 @@ def errors(ids, others):
 @cache
 def envelope(id):
     """Times, s, and the largest distance from the reference in the window that ends there, mm."""
-    policy = contender(id).make(nominal_of(usm_gym.Robot(), scenario()))
-    trajectory = rollout(policy, [scenario()], usm_gym.Robot())[0]
+    policy = contender(id).make(scenario().nominal)
+    trajectory = rollout(policy, [scenario()])[0]
     distance = 1e3 * np.linalg.norm(trajectory.error, axis=1)
     samples = round(WINDOW / (trajectory.time[1] - trajectory.time[0]))
     ends = np.arange(samples, len(distance) + 1, samples)

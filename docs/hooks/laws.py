@@ -1,20 +1,19 @@
 """What the page of the controllers shows of each law: gains, an episode, scores."""
 
-import inspect
 import re
 from functools import cache
 from pathlib import Path
 
 import figures
-import griffe
 import usm_baselines
 from mkdocs.exceptions import PluginError
 from usm_baselines.benchmark.leaderboard import LeaderboardResult
+from usm_baselines.registry import entry
+from usm_baselines.space import declared
 
 import usm_gym
 from usm_gym.support.text import figures as in_figures
 from usm_gym.support.text import mm
-from usm_gym.task.nominal import nominal_of
 
 LEADERBOARD = Path(__file__).parents[2] / "results" / usm_gym.__version__ / "leaderboard.json"
 SHOWN = {"operation": "field", "operation-ideal": "ideal", "operation-rough": "rough"}
@@ -52,28 +51,26 @@ def shipped(ids):
 
 
 def gains(ids):
-    """What the docstring of a law's gains says of each, and its value in each policy."""
+    """What a law declares of its gains, and their values in each policy."""
     names = shipped(ids)
     values = {id: made(id)._asdict() for id in names}
     lines = [
-        row("gain", "meaning", *(f"`{id}`" for id in names)),
-        "|---|---|" + "---:|" * len(names),
+        row("gain", "meaning", "unit", "tuned within", *(f"`{id}`" for id in names)),
+        "|---|---|---|---|" + "---:|" * len(names),
     ]
-    for name, meaning in meanings(type(made(ids[0]))).items():
-        lines.append(row(f"`{name}`", meaning, *(f"{values[id][name]:.4g}" for id in names)))
+    for name, gain in declared(type(made(ids[0]))).items():
+        # Readings of one law may differ in units and ranges.
+        ranges = [entry(id).space[name] for id in ids if name in entry(id).space]
+        units = dict.fromkeys(each.unit for each in ranges) or [gain.unit]
+        within = dict.fromkeys(f"{each.low:g} to {each.high:g}" for each in ranges)
+        numbers = (f"{values[id][name]:.4g}" for id in names)
+        lines.append(row(f"`{name}`", gain.meaning, "; ".join(units), "; ".join(within), *numbers))
     return "\n".join(lines)
 
 
 def made(id):
     """The gains of a policy."""
-    return usm_baselines.make(id, nominal_of(usm_gym.Robot(), figures.scenario())).gains
-
-
-def meanings(kind):
-    """What the docstring of a class of gains says of each."""
-    sections = griffe.Docstring(inspect.getdoc(kind), parser="google").parse()
-    (attributes,) = (part.value for part in sections if part.kind.value == "attributes")
-    return {each.name: " ".join(each.description.split()) for each in attributes}
+    return usm_baselines.make(id, figures.scenario().nominal).gains
 
 
 def scores(ids):

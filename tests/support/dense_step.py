@@ -41,7 +41,7 @@ def random_moment(robot: Robot, rng: np.random.Generator, steps: int) -> Moment:
 
 def read(simulation: Simulation, index: int = 0) -> Moment:
     """Return the moment that a robot of a simulation is in."""
-    rows = _Rows(simulation.robot, simulation.snapshot().arrays["_rows"], index)
+    rows = _Rows(simulation.world.robot, simulation.snapshot().arrays["_rows"], index)
     return Moment(
         steps=int(rows.row[layout.CLOCK]),
         theta=rows.links(layout.THETA).copy(),
@@ -56,7 +56,7 @@ def read(simulation: Simulation, index: int = 0) -> Moment:
 def place(simulation: Simulation, moment: Moment, index: int = 0) -> None:
     """Put a robot of a simulation into a moment."""
     snapshot = simulation.snapshot()
-    rows = _Rows(simulation.robot, snapshot.arrays["_rows"], index)
+    rows = _Rows(simulation.world.robot, snapshot.arrays["_rows"], index)
     rows.row[layout.CLOCK] = moment.steps
     rows.links(layout.THETA)[:] = moment.theta
     rows.links(layout.OMEGA)[:] = moment.theta_dot
@@ -190,4 +190,6 @@ class _Rows:
         return self.row[first : first + self.robot.links]
 
     def forces(self) -> Array:
-        return self.row[-len(self.robot.thrusters) :]
+        thrusters = len(self.robot.thrusters)
+        first = layout.first_command(self.robot.links) + thrusters
+        return self.row[first : first + thrusters]

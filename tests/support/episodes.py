@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from usm_gym.evaluation import metric_names
+from usm_gym.planar_world import PlanarWorld
+from usm_gym.robot import Robot
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.task.conditions import FIELD
-from usm_gym.task.scenario import Scenario, sample
+from usm_gym.task.sampling import sample
+from usm_gym.task.scenario import Scenario
+
+METRICS = metric_names(PlanarWorld(Robot()))
 
 
 def short(count: int, duration: float = 1.0, seed: int = 0) -> list[Scenario]:

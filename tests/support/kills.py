@@ -22,11 +22,14 @@ import time
 import traceback
 from contextlib import redirect_stdout
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from usm_agents.learning import algorithms, training
+import regression  # registers a learner
+from usm_agents.learning import training, validation
 from usm_agents.learning.plan import PLAN, Plan
-from usm_agents.study import dissection, plans, scores
+from usm_agents.learning.settings import SETTINGS
+from usm_agents.study import dissection, plans, scores, trainings
 from usm_baselines import registry
 from usm_baselines.benchmark import tuning
 from usm_baselines.benchmark.leaderboard import MAIN
@@ -34,10 +37,12 @@ from usm_baselines.space import Range
 
 from usm_cli.commands import leaderboard
 from usm_cli.program import main
+from usm_gym.envs.usm import USMVectorEnv
 from usm_gym.suites import suite
 from usm_gym.task.scenario import STILL
 
-TRAIN = ["train", "--algorithm", "sac", "--steps", "8", "--interval", "8"]
+# Trainings, by the algorithm.
+TRAININGS = {"train": "sac", "regression": "regression"}
 COMMANDS = {
     "tune": ["tune", "sta", "--trials", "20", "--episodes", "3", "--output", "sta.json"],
     "leaderboard": ["leaderboard", "--policies", "sta,pd", "--output", "mine"],
@@ -57,12 +62,14 @@ def brief(scenario):
 def shrink():
     """Make all commands small, in this process."""
     os.fsync = lambda handle: None  # a kill is no power cut
-    training.ROBOTS = {"sac": 4}
-    algorithms.SETTINGS["sac"] |= {"learning_starts": 4, "batch_size": 8, "buffer_size": 100}
-    training.VALIDATION_EPISODES = training.TEST_EPISODES = dissection.EPISODES = 2
+    USMVectorEnv.truth = regression.stub_truth
+    SETTINGS["sac"] |= {"robots": 4, "learning_starts": 4, "batch_size": 8, "buffer_size": 100}
+    training.train = partial(training.train, validation_episodes=2, test_episodes=2)
+    trainings.train = training.train
+    dissection.EPISODES = 2
     sample = Plan.scenario
     Plan.scenario = lambda plan, random: brief(sample(plan, random))
-    for module in (training, scores, dissection):
+    for module in (validation, scores, dissection):
         module.unseen = lambda *of, unseen=module.unseen: [brief(each) for each in unseen(*of)]
     plans.RIVALS = ("sta", "zero")
     plans.PLANS["residual-sac"] = replace(plans.PLANS["residual-sac"], interval=8)
@@ -78,9 +85,10 @@ def shrink():
 
 def words(name):
     """The command as it is given, in the current folder, for the first time and again."""
-    if name != "train":
+    if name not in TRAININGS:
         return COMMANDS[name]
-    return [*(["train", "--resume"] if Path("mine", PLAN).exists() else TRAIN), "--output", "mine"]
+    new = ["--algorithm", TRAININGS[name], "--steps", "8", "--interval", "8"]
+    return ["train", *(["--resume"] if Path("mine", PLAN).exists() else new), "--output", "mine"]
 
 
 def begin(name, folder, die=None):
@@ -223,7 +231,7 @@ def anywhere(name, whole, folder, wanted, longest, chance):
 
 def run():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("commands", nargs="*", default=["train", *COMMANDS])
+    parser.add_argument("commands", nargs="*", default=[*TRAININGS, *COMMANDS])
     parser.add_argument("--kills", type=int, default=20, help="at random moments, each command")
     parser.add_argument("--every", action="store_true", help="at every operation only")
     parser.add_argument("--seed", type=int, default=0)
@@ -238,7 +246,7 @@ def run():
             finished(begin(name, folder / "whole"))
             longest = time.monotonic() - start
             whole = contents(folder / "whole")
-            if name == "train":
+            if name in TRAININGS:
                 kills, well = everywhere(name, whole, folder / "every")
                 print(f"{name}: killed at each of {kills} operations, {well} equal")
                 good &= kills == well > 0

@@ -12,11 +12,9 @@ from support.episodes import short
 from usm_baselines.contender import contender
 
 import usm_gym
-from usm_gym import Robot
-from usm_gym.task.nominal import nominal_of
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
-NOMINAL = nominal_of(Robot(), named("nominal", "operation"))
+NOMINAL = named("nominal", "operation").nominal
 PAGE = Path(__file__).parents[2] / "docs" / "own_controller.md"
 FAULTY = """
 class Plain:

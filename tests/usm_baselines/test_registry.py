@@ -12,8 +12,8 @@ from usm_baselines import registry
 
 from usm_gym import Water
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.nominal import Nominal, nominal_of
-from usm_gym.task.scenario import named, sample
+from usm_gym.task.nominal import Nominal
+from usm_gym.task.sampling import named, sample
 
 SCRIPTED = ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero")
 RIVALS = ("pid", "ladrc", "lqg", "lqg-joints", "mpc", "smc", "gsta", "agsta")
@@ -102,14 +102,13 @@ def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
 
 
 def test_nominal_knowledge_tells_no_water_from_another() -> None:
-    robot = gym.make("USM-Operation-v0").unwrapped.robot
     rng = np.random.default_rng(0)
-    rough = {nominal_of(robot, sample("operation", PRESETS["rough"], rng)) for _ in range(5)}
+    rough = {sample("operation", PRESETS["rough"], rng).nominal for _ in range(5)}
     assert len(rough) == 1
     wild = replace(
         named("nominal", "operation"), water=Water(current=(0.1, 0.1), coefficients=(1.5,) * 6)
     )
-    assert nominal_of(robot, wild) == nominal_of(robot, named("nominal", "operation"))
+    assert wild.nominal == named("nominal", "operation").nominal
 
 
 def test_environments_may_be_wrapped_vectorised_or_left_out() -> None:

@@ -3,12 +3,13 @@
 import json
 
 import pytest
+from support.ball import BallScenario
 from support.episodes import short
 from support.results import PROVENANCE, evaluation, scores
 from usm_baselines.benchmark import leaderboard_figures, robustness
 from usm_baselines.benchmark.leaderboard import MAIN, FrontPoint, LeaderboardResult, Standing
 from usm_baselines.benchmark.leaderboard_page import brief_table, csv_text, markdown
-from usm_baselines.benchmark.results import MiddleSummary
+from usm_baselines.benchmark.results import EvaluationResult, MiddleSummary
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult, ScoredPoint
 
 from usm_cli.commands import evaluate
@@ -100,6 +101,22 @@ def test_robustness_curves(axes, tmp_path, monkeypatch):
     text = (tmp_path / "page.html").read_text()
     assert all(f"pd, {axis}" in text for axis in axes)
     assert "pd is refused at 1: too much" in text
+
+
+def test_a_result_of_another_world(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    result = evaluation("xyz", ("pd", "sta"), [BallScenario(noise_seed=k) for k in range(3)])
+    result.write("ball.json")
+    assert EvaluationResult.read("ball.json") == result
+    main(["report", "ball.json", "--output", "page.html"])
+    text = (tmp_path / "page.html").read_text()
+    assert "this result is in x, y and z" in text
+    assert "joint motion" not in text
+    main(["compare", "ball.json:pd", "ball.json:sta"])
+    assert "z: ball.json:pd 3.00 mm" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="2"):
+        main(["compare", "ball.json:pd", "sta"])
+    assert "of another world" in capsys.readouterr().err
 
 
 def test_a_result_in_which_everybody_is_refused_has_a_page(tmp_path, monkeypatch):

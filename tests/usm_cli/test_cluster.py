@@ -28,6 +28,7 @@ def address() -> Iterator[str]:
         cluster.shutdown()
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_bits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str
 ) -> None:

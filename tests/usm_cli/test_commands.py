@@ -97,6 +97,7 @@ def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
     assert data["provenance"]["command"].startswith("usm evaluate --policies sta,pd")
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_workers(tmp_path):
     results = []
     for workers in ("1", "2"):
@@ -186,6 +187,7 @@ class Waiting:
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
     (tmp_path / "mine.py").write_text(WAITING)
     process = subprocess.Popen(
@@ -218,6 +220,7 @@ class Leaving(Zero):
 """
 
 
+@pytest.mark.slow
 def test_own_folders_named_like_ours_hide_none_and_workers_find_own_modules(tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
     for package in ("usm_agents", "usm_baselines", "usm_gym", "usm_cli", "tests"):
@@ -230,6 +233,7 @@ def test_own_folders_named_like_ours_hide_none_and_workers_find_own_modules(tmp_
     assert results["zero"] == results["mine:Zero"]
 
 
+@pytest.mark.slow
 def test_a_worker_that_ends_early_is_one_line(tmp_path):
     (tmp_path / "mine.py").write_text(OWN)
     arguments = ("--policies", "zero,mine:Leaving", "--episodes", "2", "--workers", "2")
@@ -302,6 +306,7 @@ def test_reproduce_refuses_bad_input(arguments, message, tmp_path, monkeypatch, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_reproduce_writes_the_same_bits_twice(tmp_path):
     """At a step ten times the paper's, to save time."""
     for name in "ab":

@@ -58,6 +58,7 @@ def test_every_suite_is_there_and_a_row_with_the_joints_still() -> None:
         assert still == replace(moving, conditions=still.conditions)
 
 
+@pytest.mark.slow
 def test_the_leaderboard_is_the_same_with_one_and_two_workers(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -128,9 +129,10 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
 
 
 def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
+    from support.episodes import METRICS
     from usm_baselines.contender import contender
 
-    from usm_gym.evaluation import METRICS, Evaluation
+    from usm_gym.evaluation import Evaluation
 
     def scores(error: float) -> Evaluation:
         return Evaluation({name: np.full(50, error) for name in METRICS}, np.zeros(50, bool))
@@ -152,9 +154,10 @@ def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
 
 
 def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper() -> None:
+    from support.episodes import METRICS
     from usm_baselines.contender import contender
 
-    from usm_gym.evaluation import METRICS, Evaluation
+    from usm_gym.evaluation import Evaluation
 
     order = ("lqg", "lqg-tuned", "sta-tuned", "pid-tuned", "sta", "pid")
     rows = board.ranked(

@@ -293,6 +293,7 @@ def test_a_reproduction_has_a_page():
     assert "ratio 1.00" in page.html([made], provenance({}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 400])
 def test_a_page_is_readable(browser, folder, varied, width, scheme):
@@ -306,6 +307,7 @@ def test_a_page_is_readable(browser, folder, varied, width, scheme):
         assert browser.execute_script(SMALLEST) >= 11
 
 
+@pytest.mark.slow
 def test_a_replay_obeys_slider_picker_and_button(browser, folder):
     show(browser, folder / "page.html")
     slider, clock = find(browser, ".time"), find(browser, ".clock")
@@ -345,6 +347,7 @@ def test_a_replay_obeys_slider_picker_and_button(browser, folder):
     assert browser.get_log("browser") == []
 
 
+@pytest.mark.slow
 def test_plots_zoom_and_tell_by_keys(browser, folder, varied):
     show(browser, folder / "page.html")
     limits = "const {min, max} = replays[0].charts[0].scales.x; return max - min"
@@ -373,6 +376,7 @@ def test_plots_zoom_and_tell_by_keys(browser, folder, varied):
     assert browser.get_log("browser") == []
 
 
+@pytest.mark.slow
 def test_tables_sort_both_ways_by_keys(browser, folder):
     show(browser, folder / "page.html")
     for column, selector in ((0, "tbody th"), (1, "tbody td:nth-child(2)")):

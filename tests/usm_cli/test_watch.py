@@ -59,6 +59,7 @@ def probe(path):
     return about, frames
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("suffix", "policies", "speed", "size", "fps", "frames"),
     [
@@ -165,6 +166,7 @@ def test_without_a_display_a_film_is_asked_for():
     assert answer.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_window_shows_the_episode_to_its_end(short):
     answer = usm("watch", "--policies", "sta,pd", "--suite", short, "--speed", "4")
     assert answer.returncode == 0, answer.stderr
@@ -237,6 +239,7 @@ def test_a_full_disk_leaves_one_line_and_no_file(output):
     assert list(output.parent.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_with_status_130_and_no_file(output):
     arguments = ["watch", "--seed", "1", "--speed", "0.01", "--output", output]
     process = subprocess.Popen(listening(USM, *arguments), stderr=subprocess.PIPE, text=True)

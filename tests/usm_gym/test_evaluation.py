@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 import usm_baselines
 from numpy.typing import NDArray
+from support.episodes import METRICS
 
 import usm_gym
 from usm_gym import Inspection, Path, Robot, Scenario, Thruster
-from usm_gym.evaluation import METRICS, POSITION_METRICS, Evaluation, rollout
+from usm_gym.evaluation import Evaluation, rollout
 from usm_gym.task import metrics
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import sample
+from usm_gym.task.sampling import sample
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def scored() -> Evaluation:
 
 def assert_same(one: Evaluation, other: Evaluation, order: Any = slice(None)) -> None:
     """Assert that two evaluations have the same bits, the other's episodes being reordered."""
-    assert list(one.per_episode) == list(other.per_episode) == list(METRICS)
+    assert list(one.per_episode) == list(other.per_episode) == METRICS
     for name, values in one.per_episode.items():
         assert np.array_equal(values, other.per_episode[name][order]), name
     assert np.array_equal(one.failed, other.failed[order])
@@ -160,7 +161,7 @@ def test_the_scores_are_those_of_the_environment_stepped_by_hand(id: str, k: int
         observation, _, terminated, truncated, info = env.step(action)
         errors.append((info["error_x"], info["error_y"]))
         headings.append(info["heading_error"])
-        commands.append(env.unwrapped.simulation.command[0].copy())
+        commands.append(env.unwrapped.simulation.read("command")[0].copy())
         over = terminated or truncated
     assert not terminated
     period, settle = scenario.conditions.control_period, 0.5
@@ -185,14 +186,14 @@ def test_the_scores_are_those_of_the_environment_stepped_by_hand(id: str, k: int
 
 def test_trajectories_are_those_of_the_control_instants() -> None:
     scenarios = mixed()
-    for scenario, trajectory in zip(scenarios, rollout(policy(), scenarios, ROBOT), strict=True):
+    for scenario, trajectory in zip(scenarios, rollout(policy(), scenarios), strict=True):
         assert trajectory.scenario is scenario
         steps = scenario.steps
         assert trajectory.time[0] == scenario.conditions.control_period
         assert trajectory.time[-1] == pytest.approx(scenario.duration)
         assert trajectory.error.shape == (steps, 2)
         assert trajectory.command.shape == (steps, 5)
-        assert trajectory.heading_error.shape == (steps,)
+        assert trajectory.attitude_error.shape == (steps, 1)
         assert not trajectory.lost
 
 
@@ -202,7 +203,7 @@ def test_a_lost_episode_counts_as_half_a_metre_or_worse_in_both_axes() -> None:
     near = replace(away, path=Path(speed=0.01, amplitude=0.0))
     result = usm_gym.evaluate(Still(), [near, away, near])
     assert result.failed.tolist() == [False, True, False]
-    for name in POSITION_METRICS:
+    for name in METRICS[:6]:
         assert 0.5 <= result.per_episode[name][1] < 0.52
         assert result.per_episode[name][0] < 0.1
     summary = result.summary()
@@ -232,7 +233,7 @@ def test_a_state_that_is_not_finite_is_a_loss_too() -> None:
     result = usm_gym.evaluate(Still(), [replace(near, conditions=conditions), near])
     assert result.failed.tolist() == [True, False]
     assert all(np.isfinite(values).all() for values in result.per_episode.values())
-    assert min(result.per_episode[name][0] for name in POSITION_METRICS) >= 0.5
+    assert min(result.per_episode[name][0] for name in METRICS[:6]) >= 0.5
     json.dumps(result.summary(), allow_nan=False)
 
 
@@ -335,5 +336,5 @@ def test_a_privileged_policy_is_given_the_true_state() -> None:
 
     seen: list[Array] = []
     scenario = short("operation", "field", 0, 1.0)
-    (trajectory,) = rollout(Seer(), [scenario], ROBOT)
+    (trajectory,) = rollout(Seer(), [scenario])
     assert np.array_equal(np.concatenate(seen[1:]), trajectory.error[:-1])

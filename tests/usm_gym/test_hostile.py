@@ -11,18 +11,16 @@ from support.strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
 
 import usm_gym
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
-from usm_gym.envs.env import USMEnv
-from usm_gym.envs.vector_env import USMVectorEnv
-from usm_gym.robot import robot_of
+from usm_gym.envs.usm import USMEnv, USMVectorEnv
+from usm_gym.robots import robot_of
 from usm_gym.support.validation import QUOTED, SAID
 from usm_gym.task.conditions import conditions_of
-from usm_gym.task.nominal import nominal_of
 from usm_gym.task.scenario import MODES
 
 # Physics steps times links that an example may take.
 AFFORDABLE = 300_000
 ROBOT = Robot()
-NOMINAL = nominal_of(ROBOT, Scenario())
+NOMINAL = Scenario().nominal
 CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Scenario]
 
 

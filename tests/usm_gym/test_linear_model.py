@@ -10,21 +10,25 @@ import usm_gym
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, linear_model
 from usm_gym.plant import layout as rows
 from usm_gym.simulation import Simulation
-from usm_gym.task.nominal import nominal_of
 
 # Everything is nominal, the reference rests.
 CALM = Conditions(current_limit=0.0, coefficient_range=(1.0, 1.0), position_noise=0.0)
 HERE = Scenario(path=Path(speed=0.0, amplitude=0.0), conditions=replace(CALM, motion=False))
-NOMINAL = nominal_of(Robot(), HERE)
+NOMINAL = HERE.nominal
 STILL = np.zeros((1, 5), np.float32)
 
 
 def state_of(simulation):
     """The state of a simulated robot in the order of the model, not as a deviation."""
-    links, row = simulation.robot.links, simulation.fleet.blocks[0]
-    theta, omega = simulation.theta[0], row[rows.row_of(rows.OMEGA, links) :][:links]
-    parts = [simulation.position[0], [theta.mean()], -np.diff(theta)]
-    parts += [row[rows.V_X : rows.V_Y + 1], [omega.mean()], -np.diff(omega), simulation.force[0]]
+    links, row = simulation.world.links, simulation.fleet.blocks[0]
+    theta, omega = simulation.read("theta")[0], row[rows.row_of(rows.OMEGA, links) :][:links]
+    parts = [simulation.read("position")[0], [theta.mean()], -np.diff(theta)]
+    parts += [
+        row[rows.V_X : rows.V_Y + 1],
+        [omega.mean()],
+        -np.diff(omega),
+        simulation.read("force")[0],
+    ]
     return np.concatenate(parts)
 
 
@@ -32,7 +36,7 @@ def simulated(lag, bent):
     """A robot at rest, straight or bent, whose thrusters have a lag."""
     conditions = replace(CALM, thruster_time_constant=lag, motion=bent)
     motion = Inspection(times=(0.0,), deflections=(1.1,), filter_frequency=None)
-    simulation = Simulation(Robot(), [replace(HERE, conditions=conditions, inspection=motion)])
+    simulation = Simulation([replace(HERE, conditions=conditions, inspection=motion)])
     for _ in range(1500 if bent else 0):
         simulation.step(STILL)
     return simulation

@@ -10,7 +10,7 @@ from usm_gym.suites import NAMES
 from usm_gym.suites import __main__ as writer
 from usm_gym.support.seeding import EVALUATION, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named, sample
+from usm_gym.task.sampling import named, sample
 
 
 @pytest.mark.parametrize(
@@ -53,14 +53,11 @@ def test_no_suite_holds_a_scenario_of_another_or_of_any_seed() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_suites_come_from_their_recorded_seed_bit_for_bit(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_suites_come_from_their_recorded_seed_bit_for_bit(name: str, tmp_path: Path) -> None:
     frozen = Path(writer.__file__).with_name(f"{name}.json")
     assert json.loads(frozen.read_text())["seed"] == writer.SEED
     assert writer.scenarios(name) == suite(name)
-    monkeypatch.setattr(writer, "__file__", str(tmp_path / "__main__.py"))
-    writer.main(name)
+    writer.main(name, tmp_path)
     assert (tmp_path / frozen.name).read_bytes() == frozen.read_bytes()
 
 

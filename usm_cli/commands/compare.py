@@ -29,6 +29,7 @@ from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 from usm_gym.task.metrics import MAX_ERROR, axes_of
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import OtherScenario
 
 DESCRIPTION = """\
 Compare two policies episode by episode, on the same scenarios and noise. Printed are the mean
@@ -56,7 +57,7 @@ class PolicyScores:
         scores: The largest errors of each episode, by metric.
     """
 
-    scenarios: list[Scenario]
+    scenarios: list[Scenario | OtherScenario]
     scores: Scores
 
 
@@ -83,9 +84,13 @@ def run(arguments: argparse.Namespace) -> None:
     names = (arguments.first, arguments.second)
     require(names[0] != names[1], "B", names[1], "another than A")
     files = {name: read_results(name) for name in names if is_results(name)}
-    scenarios = common_scenarios(arguments, names, files) if files else chosen_scenarios(arguments)
     missing = [named(name) for name in names if name not in files]
-    chosen = jobs(missing, scenarios, arguments.time_limit) if missing else []
+    scenarios: Sequence[Scenario | OtherScenario]
+    scenarios = common_scenarios(arguments, names, files) if files else chosen_scenarios(arguments)
+    planar = [each for each in scenarios if isinstance(each, Scenario)]
+    known = not missing or len(planar) == len(scenarios)
+    require(known, "policies", names, "two results, as these scenarios are of another world")
+    chosen = jobs(missing, planar, arguments.time_limit) if missing else []
     scores = {name: each.scores for name, each in files.items()}
     evaluated, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
@@ -110,7 +115,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def common_scenarios(
     arguments: argparse.Namespace, names: Sequence[str], files: Mapping[str, PolicyScores]
-) -> list[Scenario]:
+) -> list[Scenario | OtherScenario]:
     """The scenarios of files, which have to be the same."""
     options = ("suite", "seed", "episodes", "mode", "conditions")
     given = [f"--{name}" for name in options if getattr(arguments, name) is not None]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 from usm_baselines.paper.reproduction import (
+    AXES,
     PARTS,
     SAMPLE_TIME,
     STEP,
@@ -22,7 +23,6 @@ from usm_baselines.paper.reproduction_figures import NAMES
 
 from usm_cli.options import output_folder
 from usm_cli.terminal import empty_table, output_console, progress_bar
-from usm_gym.evaluation import AXES
 from usm_gym.support.files import write_text
 from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures, mm

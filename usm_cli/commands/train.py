@@ -10,6 +10,7 @@ from usm_cli.options import check_installed, parse_conditions
 from usm_cli.terminal import output_console, progress_bar
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
+from usm_gym.task.metrics import MAX_ERROR, axes_of
 
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
@@ -68,6 +69,7 @@ def run(arguments: argparse.Namespace) -> None:
     check_installed("usm train", "agents", "sb3_contrib")
     from usm_agents.learning.plan import Plan, read_plan
     from usm_agents.learning.training import train
+    from usm_agents.learning.validation import best_of
 
     names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
     given = {name: getattr(arguments, name) for name in names}
@@ -84,14 +86,11 @@ def run(arguments: argparse.Namespace) -> None:
     with progress_bar() as bar:
         line = bar.add_task("", total=plan.steps)
 
-        def show(steps: int, validation: str) -> None:
+        def report(steps: int, validation: str) -> None:
             bar.update(line, completed=steps, description=validation)
 
-        curve = train(plan, folder, show, arguments.resume)
-    best = min(curve, key=lambda point: point["max_error_x"] + point["max_error_y"])
+        curve = train(plan, folder, report, arguments.resume)
     console = output_console()
-    for name, point in (("before", curve[0]), ("best", best), ("last", curve[-1])):
-        console.print(
-            f"{name}: {mm(point['max_error_x'])} / {mm(point['max_error_y'])} mm "
-            f"after {point['steps']} steps, {point['seconds']:.0f} s",
-        )
+    for name, point in (("before", curve[0]), ("best", best_of(curve)), ("last", curve[-1])):
+        errors = " / ".join(mm(point[MAX_ERROR + axis]) for axis in axes_of(point))
+        console.print(f"{name}: {errors} mm after {point['steps']} steps, {point['seconds']:.0f} s")

@@ -41,6 +41,7 @@ from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import OtherScenario
 
 Progress = Callable[[int, int], object]
 
@@ -111,7 +112,7 @@ def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> 
             replay(scenarios, rows, result.axes, choice, progress),
             Tables("Scores", SCORES, "suite", {name: score_table(rows, result.refused)}),
             *front(rows, result.axes),
-            Tables("Conditions", CONDITIONS, "suite", {name: conditions_table({name: scenarios})}),
+            *conditions("suite", name, scenarios),
             names(),
             provenance(result.provenance),
         ],
@@ -164,12 +165,7 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
                 {label: curve_table(result)},
             ),
             replay(scenarios, dict.fromkeys(result.results), result.axes, choice, progress),
-            Tables(
-                "Conditions",
-                f"{CONDITIONS} These are the conditions before anything is varied.",
-                "suite",
-                {"scenarios": conditions_table({"scenarios": scenarios})},
-            ),
+            *conditions("suite", "scenarios", scenarios, " These hold before anything is varied."),
             names(),
             provenance(result.provenance),
         ],
@@ -274,13 +270,30 @@ def by_total(rows: Mapping[str, Scores]) -> dict[str, Scores]:
     return dict(sorted(rows.items(), key=lambda pair: pair[1].total))
 
 
+def conditions(
+    label: str, name: str, scenarios: Sequence[Scenario | OtherScenario], besides: str = ""
+) -> list[Tables]:
+    """The conditions of a result, if its scenarios are of the robot that has such."""
+    planar = planar_only(scenarios)
+    if not planar:
+        return []
+    table = {name: conditions_table({name: planar})}
+    return [Tables("Conditions", CONDITIONS + besides, label, table)]
+
+
+def planar_only(scenarios: Sequence[Scenario | OtherScenario]) -> list[Scenario]:
+    """Scenarios, if all are of the planar robot."""
+    planar = [each for each in scenarios if isinstance(each, Scenario)]
+    return planar if len(planar) == len(scenarios) else []
+
+
 def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
     """Error against thrust variation, if anybody has scores."""
     return [plots.front(rows, {})] if axes else []
 
 
 def replay(
-    scenarios: Sequence[Scenario],
+    scenarios: Sequence[Scenario | OtherScenario],
     rows: Mapping[str, Scores | None],
     axes: Sequence[str],
     choice: Choice,
@@ -298,11 +311,12 @@ def replay(
     index = choice.scenario
     require(index < len(scenarios), "--scenario", index, f"0 to {len(scenarios) - 1}")
     title = f"Episode {index}, replayed"
-    if axes and tuple(axes) != PLANE:
+    planar = planar_only(scenarios)
+    if not planar or (axes and tuple(axes) != PLANE):
         plane = f"a replay draws a robot in the plane of {listed(PLANE)}"
         return Facts("Replay", {"none": f"{plane}, and this result is in {listed(axes)}"})
     contenders, missing = able(rows, choice)
-    scenario, done = scenarios[index], 0
+    scenario, done = planar[index], 0
 
     def advance() -> None:
         nonlocal done

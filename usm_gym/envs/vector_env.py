@@ -1,4 +1,4 @@
-"""The native vector environment: many robots in one simulation."""
+"""The native vector environment: many robots in one simulation, in any world."""
 
 from __future__ import annotations
 
@@ -23,14 +23,11 @@ from usm_gym.envs.env import (
     render_fps,
     scenario_of,
 )
-from usm_gym.rendering.viewer import RENDER_MODES, Viewer
-from usm_gym.robot import Robot, robot_of
+from usm_gym.rendering.viewer import Viewer
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.support.validation import is_whole, require
-from usm_gym.task.conditions import Conditions, conditions_of
-from usm_gym.task.nominal import Nominal, nominal_of
-from usm_gym.task.observation import ObservationLayout
-from usm_gym.task.scenario import Mode, Scenario, mode_of, named
+from usm_gym.task.nominal import Nominal, shared_nominal
+from usm_gym.world import Sampler, world_of
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -54,17 +51,15 @@ class VectorSnapshot:
     done: Flags
 
 
-class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any]):
-    """`num_envs` underwater swimming manipulators, each as in `USMEnv`, to the bit.
+class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any]):
+    """`num_envs` robots, each as in `TrackingEnv`, with the same bits.
 
-    Made by `gym.make_vec("usm_gym:USM-Operation-v0", num_envs=256,
-    vectorization_mode="vector_entry_point")`. Spaces, reward, start, end and info are those of
-    `USMEnv` with a batch axis; robot i with seed s behaves as the single environment with seed s.
-
-    `reset(seed=s)` gives robot i the seed s + i; a list gives each its own. The option "scenario"
-    is for all robots, or a list with one for each (None draws one); the option "reset_mask", a bool
-    array, resets only some. All three autoreset modes are supported: "NextStep" (Gymnasium's
-    default), "SameStep" with `final_obs` and `final_info`, and "Disabled".
+    Attributes:
+        sampler: Where their scenarios come from.
+        world: The world that they are in.
+        layout: Table of the observation.
+        threads: How many threads share a step.
+        autoreset_mode: What happens to a robot whose episode has ended.
     """
 
     # Until Gymnasium 1.4, an environment is closed even if its constructor has failed.
@@ -73,59 +68,44 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
     def __init__(
         self,
         num_envs: int,
-        mode: Mode,
-        conditions: str | Mapping[str, Any] | Conditions = "field",
-        robot: Mapping[str, Any] | Robot | None = None,
-        render_mode: str | None = None,
+        sampler: Sampler,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
-        render_index: int = 0,
+        viewer: Viewer | None = None,
     ) -> None:
         """Make the environment.
 
         Args:
             num_envs: How many robots.
-            mode: "operation" or "torpedo".
-            conditions: As of `USMEnv`.
-            robot: As of `USMEnv`.
-            render_mode: As of `USMEnv`: "rgb_array" gives an image of each robot, "human" shows one
-                robot in a window.
+            sampler: Where the scenarios come from.
             autoreset_mode: What happens to a robot whose episode has ended.
             threads: How many threads share a step, at most one per core; without effect on its
                 result.
-            render_index: Which robot the window shows.
+            viewer: What draws the robots; without one, nothing is drawn.
 
         Raises:
             ValueError: If an argument is not allowed.
         """
-        allowed = f"1 to {MOST_ROBOTS}"
-        require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)
+        checked_number(num_envs)
         require(is_whole(threads, 1), "threads", threads, "1 or more")
-        require(
-            is_whole(render_index, 0, num_envs - 1),
-            "render_index",
-            render_index,
-            f"0 to {num_envs - 1}",
-        )
-        self.num_envs = num_envs
-        self.mode: Mode = mode_of(mode)
-        self.conditions = conditions_of(conditions)
-        self.robot = robot_of(robot)
-        self.threads = threads
-        self.render_mode = render_mode
-        modes = [each.value for each in AutoresetMode]
+        modes = [mode.value for mode in AutoresetMode]
         known = isinstance(autoreset_mode, AutoresetMode) or autoreset_mode in modes
         require(known, "autoreset_mode", autoreset_mode, ", ".join(modes))
+        self.num_envs = num_envs
+        self.sampler = sampler
+        self.threads = threads
+        self.world = world_of(sampler.body)
+        self.layout = self.world.layout
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {
-            "render_modes": list(RENDER_MODES),
-            "render_fps": render_fps(self.conditions),
+            **self.metadata,
+            "render_fps": render_fps(sampler.conditions),
             "autoreset_mode": self.autoreset_mode,
         }
-        self._viewer = None if render_mode is None else Viewer(render_mode, num_envs, render_index)
-        self.layout = ObservationLayout(self.robot.links, len(self.robot.thrusters))
+        self.render_mode = None if viewer is None else viewer.mode
+        self._viewer = viewer
         self.single_observation_space = self.layout.space
-        self.single_action_space = action_space(self.robot)
+        self.single_action_space = action_space(self.world)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._streams: list[np.random.Generator] = []
@@ -134,11 +114,14 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
 
     @property
     def nominal(self) -> Nominal:
-        """What a controller may know beforehand."""
-        scenario = named("nominal", self.mode, self.conditions)
-        if self._simulation is not None:
-            scenario = self._simulation.scenarios[0]
-        return nominal_of(self.robot, scenario)
+        """What a controller may know beforehand, the same of all robots.
+
+        Raises:
+            ValueError: If the robots' scenarios do not agree in it.
+        """
+        if self._simulation is None:
+            return self.sampler.nominal
+        return shared_nominal(self._simulation.scenarios)
 
     @property
     def simulation(self) -> Simulation:
@@ -168,7 +151,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         scenarios = {i: self._draw(streams[i], self._options_of(i, options)) for i in indices}
         if which.all():
             ordered = [scenarios[i] for i in indices]
-            self._simulation = Simulation(self.robot, ordered, self.threads)
+            self._simulation = Simulation(ordered, self.threads)
         else:
             for scenario in scenarios.values():
                 self.simulation.check(scenario)
@@ -189,7 +172,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             gymnasium.error.ResetNeeded: If, without autoreset, an episode has ended.
         """
         simulation = self.simulation
-        batch = checked_action(actions, (self.num_envs, len(self.robot.thrusters)))
+        batch = checked_action(actions, (self.num_envs, self.world.thrusters))
         waiting = self._done.copy()
         if self.autoreset_mode is AutoresetMode.DISABLED and waiting.any():
             raise gym.error.ResetNeeded(f"robots {np.flatnonzero(waiting).tolist()} wait for reset")
@@ -210,6 +193,13 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         told = {**final, **self._infos(np.ones(self.num_envs, bool))}
         return simulation.observation.copy(), rewards, terminated, truncated, told
 
+    def truth(self) -> dict[str, NDArray[np.float64]]:
+        """True parameters and signals of all robots, for training; no policy is given them.
+
+        See `World.truth`.
+        """
+        return self.simulation.world.truth(self.simulation.read)
+
     def snapshot(self) -> VectorSnapshot:
         """Copy the whole state, the streams from which scenarios are drawn included."""
         streams = tuple(stream.bit_generator.state for stream in self._streams)
@@ -217,7 +207,7 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
 
     def restore(self, snapshot: VectorSnapshot) -> None:
         """Return to a snapshot; equal actions then have equal consequences, to the bit."""
-        self._simulation = Simulation(self.robot, snapshot.simulation.scenarios, self.threads)
+        self._simulation = Simulation(snapshot.simulation.scenarios, self.threads)
         self._simulation.restore(snapshot.simulation)
         self._streams = [seeding.np_random(0)[0] for _ in snapshot.streams]
         for stream, state in zip(self._streams, snapshot.streams, strict=True):
@@ -247,8 +237,8 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
         for index in np.flatnonzero(which).tolist():
             self.simulation.start(index, self._draw(self._streams[index], {}))
 
-    def _draw(self, stream: np.random.Generator, options: Mapping[str, Any]) -> Scenario:
-        return scenario_of(options, self.mode, self.conditions, self.robot, stream)
+    def _draw(self, stream: np.random.Generator, options: Mapping[str, Any]) -> Any:
+        return scenario_of(self.sampler, options, stream)
 
     def _seeded(
         self, seed: int | Sequence[int | None] | None, which: Flags
@@ -316,3 +306,14 @@ class USMVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], Any])
             "final_info": self._infos(done),
             "_final_info": done,
         }
+
+
+def checked_number(num_envs: Any) -> int:
+    """A number of robots.
+
+    Raises:
+        ValueError: If it is none, or too large.
+    """
+    allowed = f"1 to {MOST_ROBOTS}"
+    require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)
+    return int(num_envs)

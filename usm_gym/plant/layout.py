@@ -33,12 +33,10 @@ DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(27, 30)
 FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = range(30, 36)
 # Thrusters: share of the way to the command that one physics step covers, and the limit.
 LAG, LIMIT = range(36, 38)
-# The path, and guidance: what the heading is, what the line of sight aims at.
-SPEED, SWAY, FREQUENCY, RAMP, LOOK_AHEAD, CROSS_TRACK, HEAD_HEADING = range(38, 45)
 # Times of the changes of the deflection (`NEVER` where there is none), then their sizes.
 NEVER = 1e30
 MAX_SHIFTS = 8
-SHIFT_TIME = 45
+SHIFT_TIME = 38
 SHIFT_SIZE = SHIFT_TIME + MAX_SHIFTS
 HEADER = SHIFT_SIZE + MAX_SHIFTS
 
@@ -77,6 +75,7 @@ def sides(links: int) -> NDArray[np.float64]:
     return np.sign(links // 2 - np.arange(links)).astype(np.float64)
 
 
-def rows(links: int, thrusters: int) -> int:
-    """Number of rows of a block for robots of `links` links and `thrusters` thrusters."""
+@shared
+def body_rows(links: int, thrusters: int) -> int:
+    """Rows of a robot of `links` links and `thrusters` thrusters; a world adds its own."""
     return first_command(links) + 2 * thrusters

@@ -1,8 +1,62 @@
-"""From a wrench on the centre of mass to thruster forces, and back (the paper's equation 4)."""
+"""The thrusters: command, lag and force; from a wrench to forces and back (equation 4)."""
 
 from __future__ import annotations
 
-from usm_gym.kernels.compile import piece
+from usm_gym.kernels.compile import compiled, piece, shared
+from usm_gym.kernels.elementary import exp_of_negative
+from usm_gym.kernels.lanes import load, store
+from usm_gym.plant.layout import *
+
+
+@compiled
+def lag_share(time_constant, step):
+    """Share of the way to its command that a thruster covers in a physics step, 1 - e^(-h/tau)."""
+    if time_constant == 0.0:
+        return 1.0
+    return 1.0 - exp_of_negative(-step / time_constant)
+
+
+@shared
+def saturated(value, limit):
+    """A value cut off at a limit; not a `piece`, whose flags would leave infinity undefined."""
+    return min(max(value, -limit), limit)
+
+
+@piece
+def command(row, lanes, lane, links, action):
+    """Set the thruster commands of one robot from its action in [-1, 1]; beyond it saturates.
+
+    `row` is the block of the robot, shape (rows * lanes,), and `lane` its place in it.
+
+    Returns:
+        The mean absolute command, N.
+    """
+    limit = row[LIMIT * lanes + lane]
+    effort = 0.0
+    for j in range(action.size):
+        share = saturated(float(action[j]), 1.0)
+        row[(first_command(links) + j) * lanes + lane] = share * limit
+        effort += abs(share * limit)
+    return effort / action.size
+
+
+@piece
+def push(block, like, plant):
+    """First-order lag of every thruster, and its force on its link."""
+    links, thrusters = plant.links, plant.thruster_links.size
+    along, across = row_of(PUSH_T, links), row_of(PUSH_N, links)
+    for j in range(thrusters):
+        store(block, along + plant.thruster_links[j], like)
+        store(block, across + plant.thruster_links[j], like)
+    lag = load(block, LAG, like)
+    commands = first_command(links)
+    forces = commands + thrusters
+    for j in range(thrusters):
+        force = load(block, forces + j, like)
+        force += lag * (load(block, commands + j, like) - force)
+        store(block, forces + j, force)
+        target = plant.thruster_links[j] + (across if plant.thruster_is_normal[j] else along)
+        store(block, target, load(block, target, like) + force)
 
 
 @piece
@@ -43,29 +97,38 @@ def allocation_matrix(sine, cosine, l, thruster_links, thruster_is_normal, T):
 
 
 @piece
-def allocate(T, f_x, f_y, moment, forces):
-    """Fill in the forces of least norm that make a wrench: f = T^T (T T^T)^-1 (f_x, f_y, moment).
+def allocate(T, wrench, rows, work, forces):
+    """Fill in the forces of least norm that make a wrench: f = T^T (T T^T)^-1 wrench.
 
-    The normal equations are solved by Cholesky's decomposition, written out.
+    The normal equations are solved by the decomposition L D L^T.
+
+    Args:
+        T: Allocation matrix, (rows, thrusters).
+        wrench: Forces and moments, N and N m, (rows,).
+        rows: How many; where it is a constant, the compiler unrolls the loops.
+        work: Room for D and what L is of it, for L, and for the solution, (2 rows + 1, rows).
+        forces: Where to write, N, (thrusters,).
     """
-    a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    D, L, z = work[:rows], work[rows : 2 * rows], work[2 * rows]
+    for i in range(rows):
+        for j in range(i + 1):
+            total, taken = 0.0, 0.0
+            for k in range(forces.size):
+                total += T[i, k] * T[j, k]
+            for k in range(j):
+                taken += L[i, k] * L[j, k] * D[k, k] if i == j else D[i, k] * L[j, k]
+            D[i, j] = total - taken
+            L[i, j] = D[i, j] / D[j, j]
+    for i in range(rows):
+        z[i] = wrench[i]
+        for k in range(i):
+            z[i] -= L[i, k] * z[k]
+    for i in range(rows - 1, -1, -1):
+        z[i] /= D[i, i]
+        for k in range(i + 1, rows):
+            z[i] -= L[k, i] * z[k]
     for j in range(forces.size):
-        a += T[0, j] * T[0, j]
-        b += T[1, j] * T[0, j]
-        c += T[1, j] * T[1, j]
-        d += T[2, j] * T[0, j]
-        e += T[2, j] * T[1, j]
-        f += T[2, j] * T[2, j]
-    b /= a
-    c -= b * b * a
-    g = d / a
-    e = (e - d * b) / c
-    f -= g * g * a + e * e * c
-    y_0 = f_x
-    y_1 = f_y - b * y_0
-    y_2 = moment - g * y_0 - e * y_1
-    z_2 = y_2 / f
-    z_1 = y_1 / c - e * z_2
-    z_0 = y_0 / a - b * z_1 - g * z_2
-    for j in range(forces.size):
-        forces[j] = T[0, j] * z_0 + T[1, j] * z_1 + T[2, j] * z_2
+        force = T[0, j] * z[0]
+        for i in range(1, rows):
+            force += T[i, j] * z[i]
+        forces[j] = force

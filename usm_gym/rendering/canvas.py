@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from usm_gym.rendering.panel import INK, LEFT, MIDDLE, PAPER, RIGHT, Colour, Panel, Points, write
 from usm_gym.rendering.picture import Picture, Posture
-from usm_gym.task.metrics import LOST_ERROR
+from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.scenario import Scenario
 
 Frame = NDArray[np.uint8]

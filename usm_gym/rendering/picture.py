@@ -83,11 +83,13 @@ class Recorder:
     def picture(self, simulation: Simulation) -> Picture:
         """Describe the present."""
         self.note(simulation)
-        index, robot, scenario = self._index, simulation.robot, simulation.scenarios[self._index]
+        index, scenario = self._index, simulation.scenarios[self._index]
+        robot = scenario.body
         count = int(simulation.count[index])
         here = self._path[count]
-        theta = np.nan_to_num(simulation.theta[index])
-        position = np.clip(np.nan_to_num(simulation.position[index]), here - FAR, here + FAR)
+        theta = np.nan_to_num(simulation.read("theta")[index])
+        position = np.nan_to_num(simulation.read("position")[index])
+        position = np.clip(position, here - FAR, here + FAR)
         wanted = reference_angles(simulation, index)
         instants = np.flatnonzero(np.isfinite(self._errors[: count + 1, 0]))
         return Picture(
@@ -96,8 +98,8 @@ class Recorder:
             time=count * scenario.conditions.control_period,
             body=Posture(robot.link_centres(theta, position), theta),
             reference=Posture(robot.link_centres(wanted, here), wanted),
-            thrust=np.nan_to_num(simulation.force[index]) / simulation.limit[index],
-            current=simulation.current[index],
+            thrust=np.nan_to_num(simulation.read("force")[index]) / simulation.limit[index],
+            current=simulation.read("water_velocity")[index],
             path=self._path,
             instants=instants,
             errors=np.clip(self._errors[instants], -FAR, FAR),
@@ -108,12 +110,10 @@ class Recorder:
 
 def reference_angles(simulation: Simulation, index: int) -> Array:
     """Link angles with the reference joint angles whose heading is the reference's, (links,)."""
-    layout = simulation.layout
-    observed = simulation.observation[index] * layout.scale
-    joints = observed[layout.slices["joint_references"]]
+    joints = simulation.read("joint_shares")[index] * simulation.read("deflection")[index]
     # phi_i = theta_i - theta_(i+1)
     shape = -np.concatenate([[0.0], np.cumsum(joints)])
     by_head = simulation.scenarios[index].heading == "head"
-    theta = np.nan_to_num(simulation.theta[index])
+    theta = np.nan_to_num(simulation.read("theta")[index])
     heading, own = (theta[-1], shape[-1]) if by_head else (theta.mean(), shape.mean())
-    return np.asarray(shape - own + heading - simulation.heading_error[index])
+    return np.asarray(shape - own + heading - simulation.attitude_error[index])

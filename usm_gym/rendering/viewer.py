@@ -24,6 +24,9 @@ class Viewer:
 
     Nothing is drawn, and pygame is not imported, before the first `render`. Canvas and window stay
     behind when an environment is pickled or copied; the copy makes its own.
+
+    Attributes:
+        mode: The render mode, "human" or "rgb_array".
     """
 
     def __init__(self, render_mode: str, robots: int = 1, in_window: int = 0) -> None:
@@ -33,7 +36,7 @@ class Viewer:
             ValueError: If the render mode is unknown.
         """
         require(render_mode in RENDER_MODES, "render_mode", render_mode, "None, human, rgb_array")
-        self._mode = render_mode
+        self.mode = render_mode
         indices = [in_window] if render_mode == "human" else range(robots)
         self._recorders = [Recorder(index) for index in indices]
         self._canvas: Canvas | None = None
@@ -46,7 +49,7 @@ class Viewer:
         """Take note of a control instant; a window shows it at once."""
         for recorder in self._recorders:
             recorder.note(simulation)
-        if self._mode == "human":
+        if self.mode == "human":
             self.render(simulation)
 
     def render(self, simulation: Simulation) -> tuple[NDArray[np.uint8], ...] | None:
@@ -78,9 +81,9 @@ class Viewer:
             from usm_gym.rendering.window import Window
         except ImportError as error:
             raise gym.error.DependencyNotInstalled(
-                f"render_mode={self._mode!r} needs {error.name}: pip install 'usm-gym[render]'"
+                f"render_mode={self.mode!r} needs {error.name}: pip install 'usm-gym[render]'"
             ) from error
         canvas = Canvas()
-        if self._mode == "human":
+        if self.mode == "human":
             self._window = Window(canvas.size, "usm-gym")
         return canvas

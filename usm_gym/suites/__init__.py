@@ -13,7 +13,8 @@ from importlib.resources import files
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.scenario import Mode, Scenario, sample
+from usm_gym.task.sampling import sample
+from usm_gym.task.scenario import Mode, Scenario
 
 NAMES = ("operation", "operation-ideal", "operation-rough", "torpedo", "table1")
 

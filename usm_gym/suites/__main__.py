@@ -11,7 +11,8 @@ from usm_gym.support.files import write_text
 from usm_gym.support.seeding import SUITE, stream
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import MODES, Mode, Scenario, named, sample
+from usm_gym.task.sampling import named, sample
+from usm_gym.task.scenario import MODES, Mode, Scenario
 
 SEED = 20261122
 RECIPES: dict[str, tuple[Mode, str, int]] = {
@@ -31,10 +32,10 @@ def scenarios(name: str) -> list[Scenario]:
     return [sample(mode, PRESETS[conditions], stream(SEED, SUITE, key, i)) for i in range(count)]
 
 
-def main(name: str) -> None:
-    """Write the suite of a name beside this file."""
+def main(name: str, folder: Path = Path(__file__).parent) -> None:
+    """Write the suite of a name into a folder, by default beside this file."""
     require(name in NAMES, "suite", name, ", ".join(NAMES))
-    path = Path(__file__).with_name(f"{name}.json")
+    path = folder / f"{name}.json"
     require(not path.exists(), "suite", name, "one that is not frozen yet")
     lines = ",\n".join("  " + json.dumps(scenario.to_dict()) for scenario in scenarios(name))
     head = json.dumps({"suite": name, "seed": SEED, "command": f"python -m usm_gym.suites {name}"})

@@ -7,7 +7,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from pydantic import TypeAdapter, model_serializer, model_validator
+from pydantic import (
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    model_serializer,
+    model_validator,
+)
 
 from usm_gym.support.files import read_json, write_json
 from usm_gym.support.provenance import provenance
@@ -37,12 +42,13 @@ class Part:
         known = {name: value for name, value in data.items() if name in others}
         return known | {cls.beside: {k: value for k, value in data.items() if k not in others}}
 
-    @model_serializer(mode="plain")
-    def _spread(self) -> dict[str, Any]:
+    @model_serializer(mode="wrap")
+    def _spread(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         defaults = {field.name: field.default for field in fields(self)}
+        values = handler(self)
         data: dict[str, Any] = {}
         for name in self.order or defaults:
-            value = getattr(self, name)
+            value = values[name]
             if name == self.beside:
                 data |= value
             elif value is not None or defaults[name] is not None:

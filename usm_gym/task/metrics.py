@@ -12,8 +12,6 @@ from usm_gym.support.validation import real_array, require
 
 # Controllers are given this long after each change of the joint references, s.
 RECOVERY = 7.0
-# Further from its reference than this in either axis a robot is lost, and counts at least this, m.
-LOST_ERROR = 0.5
 TIME_TOLERANCE = 1e-9
 # Begins the names of the metric of Table 1 in each axis.
 MAX_ERROR = "max_error_"
@@ -24,11 +22,11 @@ def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> ND
 
     Args:
         time: Times, s, shape (samples,).
-        error: True position errors, m, shape (samples, 2).
+        error: True position errors, m, shape (samples, axes).
         settle_time: From when on errors count, s.
 
     Returns:
-        Largest |error| in x and y over time >= settle_time, m, shape (2,).
+        Largest |error| in each axis over time >= settle_time, m, shape (axes,).
 
     Raises:
         ValueError: If shapes do not match, a value is not finite or no sample is late enough.
@@ -44,12 +42,12 @@ def settled_error(
 
     Args:
         time: Times, s, shape (samples,).
-        error: True position errors, m, shape (samples, 2).
+        error: True position errors, m, shape (samples, axes).
         shifts: When the joint references change, s.
         settle_time: From when on errors count, s.
 
     Returns:
-        Largest |error| in x and y, m, shape (2,).
+        Largest |error| in each axis, m, shape (axes,).
     """
     times, errors, late = _checked(time, error, settle_time)
     for shift in shifts:
@@ -59,7 +57,7 @@ def settled_error(
 
 
 def rms_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
-    """Root mean square of the position error after settling, per axis, m, shape (2,)."""
+    """Root mean square of the position error after settling, per axis, m, shape (axes,)."""
     _, errors, late = _checked(time, error, settle_time)
     return np.asarray(np.sqrt(np.mean(errors[late] ** 2, axis=0)))
 
@@ -108,7 +106,8 @@ def _checked(
     settled = real_array("settle_time", settle_time)
     require(settled.ndim == 0, "settle_time", settle_time, "a number, s")
     require(times.ndim == 1, "time", times.shape, "one dimension")
-    require(errors.shape == (times.size, 2), "error", errors.shape, f"shape ({times.size}, 2)")
+    fitting = errors.ndim == 2 and len(errors) == times.size and errors.shape[1] > 0
+    require(fitting, "error", errors.shape, f"shape ({times.size}, axes)")
     require(np.isfinite(times).all(), "time", "not finite", "finite numbers")
     require(np.isfinite(errors).all(), "error", "not finite", "finite numbers")
     # Sample times are multiples of a period and may fall short of a decimal by rounding.

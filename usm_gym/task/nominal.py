@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
-from usm_gym.robot import Robot
-from usm_gym.task.scenario import Scenario
+from usm_gym.support.validation import require
 
 
 @dataclass(frozen=True)
@@ -14,29 +14,26 @@ class Nominal:
     """The nominal knowledge from which policies are made; no true coefficient, no current.
 
     Attributes:
-        robot: The robot with its nominal coefficients.
+        robot: The robot with its nominal coefficients; `usm_gym.world.world_of` gives its axes.
         control_period: Time between two actions, s.
         thruster_time_constant: First-order lag of the thrusters, s.
         position_noise: Standard deviation of the position measurement in each axis, m.
     """
 
-    robot: Robot
+    robot: Any
     control_period: float
     thruster_time_constant: float
     position_noise: float
 
 
-def nominal_of(robot: Robot, scenario: Scenario) -> Nominal:
-    """The nominal knowledge that goes with a scenario."""
-    conditions = scenario.conditions
-    stiffness, damping = scenario.joint_stiffness, scenario.joint_damping
-    return Nominal(
-        robot=dataclasses.replace(
-            robot,
-            joint_stiffness=robot.joint_stiffness if stiffness is None else stiffness,
-            joint_damping=robot.joint_damping if damping is None else damping,
-        ),
-        control_period=conditions.control_period,
-        thruster_time_constant=conditions.thruster_time_constant,
-        position_noise=conditions.position_noise,
-    )
+def shared_nominal(scenarios: Iterable[Any]) -> Nominal:
+    """The nominal knowledge that goes with all of some scenarios.
+
+    Raises:
+        ValueError: If they do not agree in it.
+    """
+    nominal: Nominal
+    nominal, *others = dict.fromkeys(scenario.nominal for scenario in scenarios)
+    kinds = f"{len(others) + 1} kinds"
+    require(not others, "scenarios", kinds, "one nominal knowledge for all")
+    return nominal

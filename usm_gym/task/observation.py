@@ -1,99 +1,20 @@
-"""The observation: the one table of what is in it, where, in which unit, scale and bounds."""
+"""The observation: the one table of what is in it, in which unit, scale and bounds; its filling."""
 
 from __future__ import annotations
 
-import hashlib
-from abc import ABC, abstractmethod
+from collections import namedtuple
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
-import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
-from usm_gym.plant.measure import ENTRIES
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One quantity of the observation.
-
-    Attributes:
-        name: Its name.
-        size: How many numbers it has.
-        unit: Unit of the physical value.
-        scale: What the physical value is divided by.
-        bound: Largest physical value, either sign; live values stay inside.
-        meaning: What it is and where a real robot has it from.
-    """
-
-    name: str
-    size: int
-    unit: str
-    scale: float
-    bound: float
-    meaning: str
-
-
-class Layout(ABC):
-    """A table of entries, and what follows from it."""
-
-    @property
-    @abstractmethod
-    def entries(self) -> tuple[Entry, ...]:
-        """All entries in order."""
-
-    @cached_property
-    def starts(self) -> NDArray[np.int64]:
-        """Index of the first number of each entry, and the size of the whole, int64."""
-        sizes = [entry.size for entry in self.entries]
-        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-
-    @property
-    def size(self) -> int:
-        """How many numbers an observation has."""
-        return int(self.starts[-1])
-
-    @cached_property
-    def slices(self) -> dict[str, slice]:
-        """Where each entry stands, by name."""
-        return {
-            entry.name: slice(int(start), int(start) + entry.size)
-            for entry, start in zip(self.entries, self.starts, strict=False)
-        }
-
-    @cached_property
-    def scale(self) -> NDArray[np.float64]:
-        """Physical value = observation * scale, shape (size,)."""
-        return np.concatenate([np.full(entry.size, entry.scale) for entry in self.entries])
-
-    @cached_property
-    def bound(self) -> NDArray[np.float32]:
-        """Bound of each number of the observation, as it is returned, shape (size,), float32."""
-        bounds = [np.full(entry.size, entry.bound / entry.scale) for entry in self.entries]
-        return np.concatenate(bounds).astype(np.float32)
-
-    @property
-    def space(self) -> gym.Space[NDArray[np.float32]]:
-        """The observation space."""
-        return gym.spaces.Box(-self.bound, self.bound, dtype=np.float32)
-
-    @property
-    def fingerprint(self) -> str:
-        """A hash of the whole table, by which agents know the layout they were trained on."""
-        return hashlib.sha256(self.table().encode()).hexdigest()[:16]
-
-    def table(self) -> str:
-        """The table in Markdown, as the environments' documentation shows it."""
-        lines = ["| index | entry | unit | scale | bound | meaning |", "|---|---|---|---|---|---|"]
-        for entry in self.entries:
-            part = self.slices[entry.name]
-            index = str(part.start) if entry.size == 1 else f"{part.start}-{part.stop - 1}"
-            lines.append(
-                f"| {index} | `{entry.name}` | {entry.unit} | {entry.scale:g} | "
-                f"{entry.bound:g} | {entry.meaning} |"
-            )
-        return "\n".join(lines)
+from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.elementary import sincos
+from usm_gym.plant.layout import *
+from usm_gym.plant.thrusters import allocation_matrix
+from usm_gym.sensors import Entry, Layout
+from usm_gym.task.guidance import *
 
 
 @dataclass(frozen=True)
@@ -112,7 +33,7 @@ class ObservationLayout(Layout):
     def entries(self) -> tuple[Entry, ...]:
         """All entries in order."""
         joints, thrusters = self.links - 1, self.thrusters
-        table = (
+        return (
             Entry(
                 "position_error",
                 2,
@@ -162,5 +83,138 @@ class ObservationLayout(Layout):
             ),
             Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest force of a thruster"),
         )
-        assert tuple(entry.name for entry in table) == ENTRIES
-        return table
+
+
+# The number of each entry in the order of the table, by name.
+_NAMES = [entry.name for entry in ObservationLayout(links=2, thrusters=3).entries]
+ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
+
+
+@piece
+def number(row, lanes, lane, index):
+    """Number `index` of one robot of a block."""
+    return row[index * lanes + lane]
+
+
+@piece
+def measure(row, lanes, lane, plant, noise, table, error, attitude_error, observation):
+    """Fill in the true errors and the observation of one robot.
+
+    Args:
+        row: Block of the robot.
+        lanes: Robots in a block.
+        lane: Place of the robot in its block.
+        plant: What all robots share.
+        noise: Measurement error of the position now, m, (2,).
+        table: Table of the observation.
+        error: Where to write the true position error, m, (2,).
+        attitude_error: Where to write the heading error as it is known on board, rad, (1,).
+        observation: Where to write the observation.
+    """
+    links, guidance = plant.links, body_rows(plant.links, plant.thruster_links.size)
+    t = number(row, lanes, lane, CLOCK) * plant.h
+    p_y = measure_position(row, lanes, lane, guidance, t, noise, table, error, observation)
+    mean, head = measure_links(row, lanes, lane, links, table, observation)
+    heading = head if number(row, lanes, lane, guidance + HEAD_HEADING) > 0.0 else mean
+    distance = number(row, lanes, lane, P_Y) + noise[1]
+    if number(row, lanes, lane, guidance + CROSS_TRACK) > 0.0:
+        distance -= p_y
+    look_ahead = number(row, lanes, lane, guidance + LOOK_AHEAD)
+    attitude_error[0] = heading - line_of_sight(distance, look_ahead)
+    k = table.starts[ENTRY.heading_error]
+    observation[k] = attitude_error[0] * table.gain[k]
+    measure_thrusters(row, lanes, lane, links, table, observation)
+    for k in range(observation.size):
+        observation[k] = min(max(observation[k], -table.bound[k]), table.bound[k])
+
+
+@piece
+def measure_position(row, lanes, lane, guidance, t, noise, table, error, observation):
+    """Fill in the position error and what is known of the reference; returns its y."""
+    starts, gain, _ = table
+    p_x, p_y, v_x, v_y, a_x, a_y = path(
+        t,
+        number(row, lanes, lane, guidance + SPEED),
+        number(row, lanes, lane, guidance + SWAY),
+        number(row, lanes, lane, guidance + FREQUENCY),
+        number(row, lanes, lane, guidance + RAMP),
+    )
+    error[0] = number(row, lanes, lane, P_X) - p_x
+    error[1] = number(row, lanes, lane, P_Y) - p_y
+    k = starts[ENTRY.position_error]
+    observation[k] = (error[0] + noise[0]) * gain[k]
+    observation[k + 1] = (error[1] + noise[1]) * gain[k + 1]
+    k = starts[ENTRY.reference_velocity]
+    observation[k] = v_x * gain[k]
+    observation[k + 1] = v_y * gain[k + 1]
+    k = starts[ENTRY.reference_acceleration]
+    observation[k] = a_x * gain[k]
+    observation[k + 1] = a_y * gain[k + 1]
+    return p_y
+
+
+@piece
+def measure_links(row, lanes, lane, links, table, observation):
+    """Fill in the angles of tail and joints; returns the links' mean angle and the head's, rad."""
+    starts, gain, _ = table
+    angles, rates, shares = row_of(THETA, links), row_of(OMEGA, links), row_of(SHARE, links)
+    theta, omega = number(row, lanes, lane, angles), number(row, lanes, lane, rates)
+    observation[starts[ENTRY.tail_angle]] = theta * gain[starts[ENTRY.tail_angle]]
+    observation[starts[ENTRY.tail_rate]] = omega * gain[starts[ENTRY.tail_rate]]
+    reference = number(row, lanes, lane, DEFLECTION)
+    reference_rate = number(row, lanes, lane, DEFLECTION_RATE)
+    reference_acceleration = number(row, lanes, lane, DEFLECTION_ACCELERATION)
+    total = theta
+    for i in range(links - 1):
+        theta_next = number(row, lanes, lane, angles + i + 1)
+        omega_next = number(row, lanes, lane, rates + i + 1)
+        share = number(row, lanes, lane, shares + i)
+        k = starts[ENTRY.joint_angles] + i
+        observation[k] = (theta - theta_next) * gain[k]
+        k = starts[ENTRY.joint_rates] + i
+        observation[k] = (omega - omega_next) * gain[k]
+        k = starts[ENTRY.joint_references] + i
+        observation[k] = share * reference * gain[k]
+        k = starts[ENTRY.joint_reference_rates] + i
+        observation[k] = share * reference_rate * gain[k]
+        k = starts[ENTRY.joint_reference_accelerations] + i
+        observation[k] = share * reference_acceleration * gain[k]
+        theta, omega = theta_next, omega_next
+        total += theta
+    return total / links, theta
+
+
+@piece
+def measure_thrusters(row, lanes, lane, links, table, observation):
+    """Fill in the last commands and the limit."""
+    starts, gain, _ = table
+    limit, commands = number(row, lanes, lane, LIMIT), first_command(links)
+    k = starts[ENTRY.thruster_command]
+    for j in range(starts[ENTRY.thruster_limit] - k):
+        observation[k + j] = number(row, lanes, lane, commands + j) / limit * gain[k + j]
+    k = starts[ENTRY.thruster_limit]
+    observation[k] = limit * gain[k]
+
+
+@compiled
+def allocations(observation, plant, starts, scale, matrices):
+    """Fill in the allocation matrices of a batch, (batch, 3, thrusters), from what is measured.
+
+    Args:
+        observation: Observations, (batch, numbers).
+        plant: The nominal plant.
+        starts: As in `sensors.Layout`.
+        scale: As in `sensors.Layout`.
+        matrices: Where to write.
+    """
+    sine, cosine = np.empty(plant.links), np.empty(plant.links)
+    tail, joints = starts[ENTRY.tail_angle], starts[ENTRY.joint_angles]
+    for b in range(observation.shape[0]):
+        theta = observation[b, tail] * scale[tail]
+        sine[0], cosine[0] = sincos(theta)
+        for i in range(plant.links - 1):
+            theta -= observation[b, joints + i] * scale[joints + i]
+            sine[i + 1], cosine[i + 1] = sincos(theta)
+        allocation_matrix(
+            sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, matrices[b]
+        )

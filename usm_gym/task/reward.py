@@ -23,7 +23,7 @@ def reward(
     a robot is all but lost, so that such episodes do not drown the others.
 
     Args:
-        error: True position errors, m, (size, 2).
+        error: True position errors, m, (size, axes).
         effort: Mean absolute thruster commands after saturation, N, (size,).
         limit: Thruster limits, N, (size,).
 
@@ -41,10 +41,11 @@ def reward_of_loss(remaining: NDArray[np.int64]) -> NDArray[np.float64]:
 
 
 @compiled
-def _reward(error, effort, limit, rewards):  # type: ignore[no-untyped-def]
+def _reward(error, effort, limit, rewards):
+    share = 1.0 / error.shape[1]
     for k in range(rewards.size):
         cost = 0.0
-        for axis in range(2):
+        for axis in range(error.shape[1]):
             distance = abs(error[k, axis])
-            cost += 0.5 * (distance / (distance + HALF_COST_ERROR))
+            cost += share * (distance / (distance + HALF_COST_ERROR))
         rewards[k] = -ERROR_COST * cost - EFFORT_COST * (effort[k] / limit[k])

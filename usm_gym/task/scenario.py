@@ -15,17 +15,18 @@ import numpy as np
 from pydantic import Field, Strict, TypeAdapter
 
 from usm_gym.plant.layout import MAX_SHIFTS
-from usm_gym.plant.motion import path_positions
-from usm_gym.robot import Damping, Stiffness
+from usm_gym.robot import Damping, Robot, Stiffness
+from usm_gym.robots import PAPER, robot_of
 from usm_gym.support.validation import Count, Number, Switch, build, require, validated
 from usm_gym.task.conditions import (
     FIELD,
     LARGEST_CURRENT,
-    PRESETS,
     Coefficient,
     Conditions,
     FilterFrequency,
 )
+from usm_gym.task.guidance import path_positions
+from usm_gym.task.nominal import Nominal
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
@@ -135,6 +136,7 @@ class Scenario:
             reference 0.
         cross_track: Whether that guidance aims at the path, rather than at the x axis as the paper
             prints it.
+        robot: The robot: its name (`usm_gym.robots`), or itself.
     """
 
     mode: Mode = "operation"
@@ -150,9 +152,11 @@ class Scenario:
     heading: Literal["mean", "head"] = "mean"
     look_ahead: Annotated[Number, Field(ge=0.01, le=1000)] | None = None
     cross_track: Switch = False
+    robot: str | Robot = PAPER
 
     def __post_init__(self) -> None:
-        """Refuse a duration of no whole number of control periods, or of too many steps."""
+        """Refuse a duration of no whole number of control periods or too many steps, and names."""
+        robot_of(self.robot)
         steps = self.duration / self.conditions.control_period
         require(
             round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),
@@ -172,6 +176,34 @@ class Scenario:
     def steps(self) -> int:
         """Control periods in the episode."""
         return round(self.duration / self.conditions.control_period)
+
+    @property
+    def body(self) -> Robot:
+        """The robot, without the joint gains that the scenario may bring."""
+        return robot_of(self.robot)
+
+    @property
+    def joint_gains(self) -> tuple[float, float]:
+        """Stiffness, N m/rad, and damping, N m s/rad, of the joint controllers."""
+        stiffness, damping = self.joint_stiffness, self.joint_damping
+        return (
+            self.body.joint_stiffness if stiffness is None else stiffness,
+            self.body.joint_damping if damping is None else damping,
+        )
+
+    @property
+    def nominal(self) -> Nominal:
+        """What a controller may know: the robot, with the joint gains that the scenario brings."""
+        body, conditions = self.body, self.conditions
+        stiffness, damping = self.joint_gains
+        if (stiffness, damping) != (body.joint_stiffness, body.joint_damping):
+            body = dataclasses.replace(body, joint_stiffness=stiffness, joint_damping=damping)
+        return Nominal(
+            robot=body,
+            control_period=conditions.control_period,
+            thruster_time_constant=conditions.thruster_time_constant,
+            position_noise=conditions.position_noise,
+        )
 
     @property
     def shifts(self) -> tuple[float, ...]:
@@ -204,8 +236,10 @@ class Scenario:
         return dataclasses.replace(self, conditions=conditions, water=water)
 
     def to_dict(self) -> dict[str, Any]:
-        """The scenario in JSON's types."""
+        """The scenario in JSON's types; the paper's robot goes without saying."""
         data: dict[str, Any] = _ADAPTER.dump_python(self, mode="json")
+        if data["robot"] == PAPER:
+            del data["robot"]
         return data
 
     @staticmethod
@@ -251,86 +285,6 @@ def mode_of(value: Any) -> Mode:
     require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
     mode: Mode = value
     return mode
-
-
-def sample(
-    mode: Mode, conditions: Conditions, stream: np.random.Generator, joints: int = 15
-) -> Scenario:
-    """Draw a scenario of a mode (ranges: docs/model.md section 9).
-
-    Args:
-        mode: "operation" or "torpedo".
-        conditions: Conditions, whose ranges are used.
-        stream: Where all randomness comes from.
-        joints: Number of joints of the robot; a third to eleven fifteenths of them bend.
-    """
-    if mode_of(mode) == "torpedo":
-        path = Path(
-            speed=stream.uniform(0.05, 0.3),
-            amplitude=stream.uniform(0.0, 0.5),
-            frequency=stream.uniform(0.03, 0.12),
-        )
-        inspection = STILL
-    else:
-        path = Path(
-            speed=stream.uniform(0.0, 0.1),
-            amplitude=stream.uniform(0.0, 0.25),
-            frequency=stream.uniform(0.03, 0.15),
-        )
-        bending_joints = int(stream.integers(max(1, joints // 3), max(1, 11 * joints // 15) + 1))
-        side = 1.0 if stream.random() < 0.5 else -1.0
-        first, second = stream.uniform(*conditions.deflection_range, 2)
-        third = stream.uniform(-0.35, 0.35)
-        times = np.array([10.0, 20.0, 30.0]) + stream.uniform(-2.0, 2.0, 3)
-        inspection = Inspection(
-            bending_joints=bending_joints,
-            times=tuple(times.tolist()),
-            deflections=(side * first, -side * second, third),
-            filter_frequency=stream.uniform(*conditions.filter_range),
-        )
-    noise_seed = int(stream.integers(2**63))
-    return dataclasses.replace(
-        named("nominal", mode, conditions),
-        path=path,
-        inspection=inspection,
-        water=draw_water(conditions, noise_seed),
-        noise_seed=noise_seed,
-    )
-
-
-def named(
-    name: str, mode: Mode, conditions: Conditions | None = None, joints: int = 15
-) -> Scenario:
-    """The scenario "nominal" or "table1" of a mode (docs/model.md section 9).
-
-    Args:
-        name: "nominal", or "table1", the scenario of the paper's Table 1.
-        mode: "operation" or "torpedo".
-        conditions: Its conditions; without them "field" for nominal and "ideal" for table1.
-        joints: Number of joints of the robot; eleven fifteenths of them bend.
-    """
-    require(name in ("nominal", "table1"), "scenario", name, "nominal, table1")
-    torpedo = mode == "torpedo"
-    bending_joints = max(1, 11 * joints // 15)
-    if name == "nominal":
-        return Scenario(
-            mode=mode,
-            path=Path(speed=0.1) if torpedo else Path(),
-            inspection=STILL if torpedo else Inspection(bending_joints=bending_joints),
-            conditions=conditions or FIELD,
-            look_ahead=2.24 if torpedo else None,
-        )
-    return Scenario(
-        mode=mode,
-        path=Path(ramp=0.0),
-        inspection=STILL
-        if torpedo
-        else Inspection(bending_joints=bending_joints, filter_frequency=None),
-        conditions=conditions or PRESETS["ideal"],
-        joint_stiffness=9000.0,
-        joint_damping=150.0,
-        look_ahead=2.24 if torpedo else None,
-    )
 
 
 def _pair(values: Any) -> tuple[float, float]:

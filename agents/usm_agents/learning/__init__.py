@@ -1,1 +1,1 @@
-"""Training of agents: all that imports torch."""
+"""Training of agents. What imports torch and Stable-Baselines3 is in `sb3`."""

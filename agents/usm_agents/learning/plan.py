@@ -12,12 +12,13 @@ import gymnasium as gym
 import numpy as np
 from pydantic import Field, Strict, TypeAdapter
 
-from usm_agents.learning.algorithms import CLASSES
+from usm_agents.learning.learner import algorithms
 from usm_agents.residual.task import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.support.files import read_bytes, write_json
 from usm_gym.support.validation import Count, UsageError, in_one_line, require, validated
 from usm_gym.task.conditions import FIELD, Conditions
-from usm_gym.task.scenario import Mode, Scenario, sample
+from usm_gym.task.sampling import sample
+from usm_gym.task.scenario import Mode, Scenario
 
 PLAN = "plan.json"
 # The scenarios on which an agent is scored in the end, as `usm evaluate` samples them.
@@ -36,7 +37,8 @@ class Plan:
     """What is trained, and how long.
 
     Attributes:
-        algorithm: "ppo", "recurrent-ppo", "sac", "td3" or "tqc".
+        algorithm: "ppo", "recurrent-ppo", "sac", "td3" or "tqc", or a name that is registered with
+            `usm_agents.learning.learner`.
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, 1e-6 to 1000 N and N m.
@@ -64,7 +66,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained."""
-        require(self.algorithm in CLASSES, "algorithm", self.algorithm, ", ".join(CLASSES))
+        require(
+            self.algorithm in algorithms(), "algorithm", self.algorithm, ", ".join(algorithms())
+        )
         known = [id for id in gym.registry if id.endswith("Residual-v0")]
         require(self.env.removeprefix("usm_agents:") in known, "env", self.env, ", ".join(known))
         require(":" not in self.base, "base", self.base, "an id, or an id with a file of gains")

@@ -12,10 +12,10 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from usm_baselines.laws.super_twisting import SuperTwisting
 
-from usm_agents.residual.observation import BASE_STATES, ResidualLayout
+from usm_agents.residual.observation import ResidualLayout, base_entries
 from usm_agents.residual.task import Array, Flags, Memory, Residual
-from usm_gym.envs.env import USMEnv, checked_action
-from usm_gym.envs.vector_env import USMVectorEnv
+from usm_gym.envs.env import checked_action
+from usm_gym.envs.usm import USMEnv, USMVectorEnv
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 
@@ -101,9 +101,7 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 # The class docstring is the specification; its table comes from the one that the code uses.
 ResidualEnv.__doc__ = (ResidualEnv.__doc__ or "").replace(
     "OBSERVATION_TABLE",
-    ResidualLayout(5, 3, tuple(BASE_STATES[SuperTwisting].values()))
-    .table()
-    .replace("\n", "\n    "),
+    ResidualLayout(5, 3, base_entries(SuperTwisting.shown)).table().replace("\n", "\n    "),
 )
 
 

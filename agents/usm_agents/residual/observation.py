@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from usm_baselines.laws.lqg import LQG, JointLQG
-from usm_baselines.laws.mpc import MPC
-from usm_baselines.laws.pd import PD
-from usm_baselines.laws.super_twisting import SuperTwisting
-
+from usm_gym.sensors import Entry, Layout
 from usm_gym.support.validation import require
-from usm_gym.task.observation import Entry, Layout
 
-_RATE = Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer")
-_DISTURBANCE = Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same")
-_REST = Entry("base_disturbance", 2, "m/s^2", 0.2, 4.0, "what the base's model leaves out")
-_INTEGRAL = Entry("base_integral", 2, "m/s^2", 2.0, 40.0, "v of the super-twisting law (11)")
-_ADAPTED = Entry("base_alpha", 2, "m^(1/2)/s^(3/2)", 50.0, 500.0, "alpha of the same")
-# The numbers of a law's state that the agent sees, by their index in each axis. Of a base that is
-# not listed it sees the command alone.
-BASE_STATES: dict[type, dict[int, Entry]] = {
-    SuperTwisting: {1: _RATE, 2: _DISTURBANCE, 4: _INTEGRAL, 5: _ADAPTED},
-    PD: {1: _RATE, 2: _DISTURBANCE},
-    LQG: {1: _RATE, 2: _REST},
-    JointLQG: {1: _RATE, 2: _REST},
-    MPC: {1: _RATE, 2: _REST},
+# How the agent sees the numbers that laws declare as `shown`.
+BASE_ENTRIES = {
+    "rate": Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer"),
+    "disturbance": Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same"),
+    "unmodelled": Entry(
+        "base_disturbance", 2, "m/s^2", 0.2, 4.0, "what the base's model leaves out"
+    ),
+    "integral": Entry("base_integral", 2, "m/s^2", 2.0, 40.0, "v of the super-twisting law (11)"),
+    "alpha": Entry("base_alpha", 2, "m^(1/2)/s^(3/2)", 50.0, 500.0, "alpha of the same"),
 }
+
+
+def base_entries(shown: Iterable[str]) -> tuple[Entry, ...]:
+    """The entries of the base's own numbers, named as its law does.
+
+    Raises:
+        ValueError: If there is no entry for one of them.
+    """
+    for name in shown:
+        require(name in BASE_ENTRIES, "shown", name, ", ".join(BASE_ENTRIES))
+    return tuple(BASE_ENTRIES[name] for name in shown)
 
 
 @dataclass(frozen=True)

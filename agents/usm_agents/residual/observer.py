@@ -7,26 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.estimation.prediction import ESTIMATES
-from usm_baselines.laws.policy import ScriptedPolicy
+from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
 
-from usm_agents.residual.observation import BASE_STATES, ResidualLayout
+from usm_agents.residual.observation import ResidualLayout, base_entries
 from usm_gym.kernels.compile import compiled, piece, shared
-from usm_gym.plant.measure import (
-    HEADING_ERROR,
-    JOINT_ANGLES,
-    JOINT_RATES,
-    JOINT_REFERENCE_ACCELERATIONS,
-    JOINT_REFERENCE_RATES,
-    JOINT_REFERENCES,
-    TAIL_ANGLE,
-    TAIL_RATE,
-    THRUSTER_COMMAND,
-    THRUSTER_LIMIT,
-    value,
-)
 from usm_gym.policy import Policy
+from usm_gym.sensors import value
+from usm_gym.task.observation import ENTRY as PLAIN
 from usm_gym.task.observation import ObservationLayout
 
 Array = NDArray[np.float64]
@@ -39,7 +27,7 @@ ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
 
 
 class Plain(NamedTuple):
-    """How the plain observation is read, see `usm_gym.plant.measure.value`.
+    """How the plain observation is read, see `usm_gym.sensors.value`.
 
     Attributes:
         starts: First index of each entry.
@@ -119,7 +107,7 @@ def tail_over_mean(seen, plain, entry, terms):
 @piece
 def fill_axes(frame, starts, signals, estimates, innovation, b):
     """Fill in what is measured and estimated in each axis."""
-    for axis in range(2):
+    for axis in range(signals.y.shape[1]):
         error, rate, disturbance, thrust = estimates[b, axis]
         frame[starts[ENTRY.position_error] + axis] = signals.y[b, axis]
         frame[starts[ENTRY.reference_velocity] + axis] = signals.velocity[b, axis]
@@ -134,7 +122,7 @@ def fill_axes(frame, starts, signals, estimates, innovation, b):
 @piece
 def fill_wrench(frame, starts, seen, plain, T, action):
     """Fill in the wrench that the base asks for, thrusters of even and odd place added up apart."""
-    limit = value(seen, plain, THRUSTER_LIMIT, 0)
+    limit = value(seen, plain, PLAIN.thruster_limit, 0)
     for row in range(3):
         even, odd = 0.0, 0.0
         for j in range(0, action.size, 2):
@@ -148,21 +136,21 @@ def fill_wrench(frame, starts, seen, plain, T, action):
 @piece
 def fill_posture(frame, starts, seen, plain, terms):
     """Fill in heading and joint motion."""
-    tail, rate = value(seen, plain, TAIL_ANGLE, 0), value(seen, plain, TAIL_RATE, 0)
-    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, JOINT_ANGLES, terms)
-    frame[starts[ENTRY.heading_error]] = value(seen, plain, HEADING_ERROR, 0)
-    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(seen, plain, JOINT_RATES, terms)
-    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, JOINT_ANGLES, terms)
-    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, JOINT_RATES, terms)
+    tail, rate = value(seen, plain, PLAIN.tail_angle, 0), value(seen, plain, PLAIN.tail_rate, 0)
+    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, PLAIN.joint_angles, terms)
+    frame[starts[ENTRY.heading_error]] = value(seen, plain, PLAIN.heading_error, 0)
+    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(seen, plain, PLAIN.joint_rates, terms)
+    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, PLAIN.joint_angles, terms)
+    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, PLAIN.joint_rates, terms)
     reference = starts[ENTRY.reference_deflection]
-    frame[reference] = over_joints(seen, plain, JOINT_REFERENCES, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_references, terms)
     reference = starts[ENTRY.reference_deflection_rate]
-    frame[reference] = over_joints(seen, plain, JOINT_REFERENCE_RATES, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_rates, terms)
     reference = starts[ENTRY.reference_deflection_acceleration]
-    frame[reference] = over_joints(seen, plain, JOINT_REFERENCE_ACCELERATIONS, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_accelerations, terms)
     bending = 0.0
     for i in range(terms.size):
-        if value(seen, plain, JOINT_REFERENCES, i) != 0.0:
+        if value(seen, plain, PLAIN.joint_references, i) != 0.0:
             bending += 1.0
     frame[starts[ENTRY.bending_joints]] = bending
 
@@ -172,7 +160,7 @@ def show(
     table, plain, signals, estimates, innovation, action, state, last, start, past, seen, kept
 ):
     """Fill in the observations `seen` and the frames `kept` of a batch; see `ResidualObserver`."""
-    joints = plain.starts[JOINT_RATES] - plain.starts[JOINT_ANGLES]
+    joints = plain.starts[PLAIN.joint_rates] - plain.starts[PLAIN.joint_angles]
     frame, terms = np.empty(table.complete), np.empty(joints)
     starts, width = table.starts, table.shown.size
     for b in range(seen.shape[0]):
@@ -182,7 +170,7 @@ def show(
             frame[table.base[k, 0]] = state[b, table.base[k, 1]]
         fill_wrench(frame, starts, measured, plain, signals.allocation[b], action[b])
         for j in range(action.shape[1]):
-            command = value(measured, plain, THRUSTER_COMMAND, j)
+            command = value(measured, plain, PLAIN.thruster_command, j)
             frame[starts[ENTRY.thruster_command] + j] = command
         for i in range(last.shape[1]):
             frame[starts[ENTRY.last_action] + i] = 0.0 if start[b] else last[b, i]
@@ -213,16 +201,16 @@ class ResidualObserver:
         frames: int,
     ) -> None:
         """Take the base, whose state is shown, and the layout of the plain observation."""
-        shown = BASE_STATES.get(type(base), {})
-        entries = tuple(shown.values())
+        law = base if isinstance(base, ScriptedPolicy) else None
+        entries = base_entries(law.shown) if law else ()
+        columns = [law.columns[name] for name in law.shown] if law else []
         self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
         whole = ResidualLayout(plain.thrusters, actions, entries)
         numbers, slices = np.arange(whole.size), whole.slices
-        places = np.array([numbers[slices[entry.name]] for entry in entries], np.int64)
-        columns = _columns(base, list(shown)) if shown else np.empty(0, np.int64)
+        places = [numbers[slices[entry.name]] for entry in entries]
         self._table = Table(
             starts=np.array([slices[name].start for name in ENTRY._fields]),
-            base=np.stack([places.ravel(), columns], axis=1),
+            base=np.array([places, columns], np.int64).reshape(2, -1).T.copy(),
             shown=np.concatenate([numbers[slices[entry.name]] for entry in self.layout.frame]),
             scale=self.layout.scale,
             bound=self.layout.bound,
@@ -278,12 +266,3 @@ class ResidualObserver:
 
 
 _NOTHING = np.empty((0, 0))
-
-
-def _columns(base: Policy, indices: list[int]) -> NDArray[np.int64]:
-    """Columns of the base's state with those numbers of the axes, (2 * indices,)."""
-    assert isinstance(base, ScriptedPolicy)
-    columns = base.law_columns
-    if columns.ndim == 1:  # a predictor's: (e, v, d) of x and of y come first
-        columns = columns[:ESTIMATES].reshape(2, -1)
-    return columns[:, indices].T.ravel()

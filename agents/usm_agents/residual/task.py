@@ -62,10 +62,10 @@ def correct_all(base_action, allocation, limit, residual, wrench, command):  # t
 
     Residuals are wrenches (N, N, N m), which thruster forces of least norm make, or forces, N.
     """
-    forces = np.empty(base_action.shape[1])
+    forces, work = np.empty(base_action.shape[1]), np.empty((7, 3))
     for b in range(len(command)):
         if wrench:
-            allocate(allocation[b], residual[b, 0], residual[b, 1], residual[b, 2], forces)
+            allocate(allocation[b], residual[b], 3, work, forces)
         else:
             forces[:] = residual[b]
         for j in range(forces.size):

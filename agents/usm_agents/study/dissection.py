@@ -21,14 +21,15 @@ from usm_agents.learning.plan import TEST_SEED
 from usm_agents.residual.task import Memory, ResidualPolicy
 from usm_agents.study.plans import AGENTS
 from usm_agents.study.results import Dissection, ForceShares
-from usm_agents.study.trainings import Training
-from usm_gym.evaluation import AXES, rollout
+from usm_agents.study.trainings import StudyTraining
+from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy
 from usm_gym.robot import Robot
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Scenario
+from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,7 @@ class ForceLog:
         action, state = self._policy.predict(observation, state, start, deterministic, **truth)
         signals, _, _, self._estimates = self._estimator.update(observation, self._estimates, start)
         memory = state[0] if isinstance(state, tuple) else None
-        forces = signals.allocation[:, : len(AXES)]
+        forces = signals.allocation[:, : signals.y.shape[1]]
         self.total.append(np.einsum("bwt,bt->bw", forces, action * self._limit))
         if isinstance(memory, Memory):
             self.base.append(np.einsum("bwt,bt->bw", forces, memory.base_action * self._limit))
@@ -89,7 +90,7 @@ def dissect(policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenar
     watched = []
     for each in (policy, policy.base, Oracle(nominal)):
         log = ForceLog(nominal, each, limit)
-        rollout(log, scenarios, Robot())
+        rollout(log, scenarios)
         watched.append(log)
     total, alone, needed = (np.stack(log.total)[settled:] for log in watched)
     base = np.stack(watched[0].base)[settled:]
@@ -105,7 +106,7 @@ def dissect(policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenar
         frequency=tuple(frequency.tolist()),
         axes={
             axis: shares_of({name: force[..., k] for name, force in forces.items()}, nominal)
-            for k, axis in enumerate(AXES)
+            for k, axis in enumerate(world_of(scenarios[0].body).axes)
         },
     )
 
@@ -149,7 +150,7 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
     return frequency, density
 
 
-def dissected(chosen: Sequence[Training]) -> dict[str, Dissection]:
+def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
     """What each agent, as its seed 0, does to its base; see `dissect`."""
     made = {}
     for training in chosen:

@@ -23,7 +23,7 @@ from usm_agents.study.results import (
     StudyResult,
     Trained,
 )
-from usm_agents.study.trainings import Training
+from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import Evaluation, joined
 from usm_gym.robot import Robot
 from usm_gym.statistics import interquartile_mean, interval, ratio_interval
@@ -39,7 +39,7 @@ ERRORS, OTHERS = ("max_error", "settled_error"), ("thrust_variation", "thrust_ef
 
 
 def jobs(
-    chosen: Sequence[Training], rivals: Sequence[str], episodes: int = TEST_EPISODES
+    chosen: Sequence[StudyTraining], rivals: Sequence[str], episodes: int = TEST_EPISODES
 ) -> dict[tuple[str, str], Job]:
     """What is scored, by policy and set: all at home, agents and rivals also elsewhere."""
     robot = Robot()
@@ -94,7 +94,7 @@ def score(
 
 
 def study(
-    chosen: Sequence[Training],
+    chosen: Sequence[StudyTraining],
     scores: Mapping[tuple[str, str], Evaluation],
     rivals: Sequence[str],
     episodes: int,

@@ -21,7 +21,7 @@ from usm_gym.support.validation import explaining, require
 
 
 @dataclasses.dataclass(frozen=True)
-class Training:
+class StudyTraining:
     """A training of the study.
 
     Attributes:
@@ -76,7 +76,7 @@ _CURVE = TypeAdapter(Annotated[tuple[CurvePoint, ...], Field(min_length=1)])
 
 def planned(
     names: Sequence[str], seeds: int, folder: Path, steps: int | None = None
-) -> list[Training]:
+) -> list[StudyTraining]:
     """The trainings of the study, seed by seed, so that an early stop leaves some of each.
 
     Args:
@@ -95,12 +95,12 @@ def planned(
             if seed >= SEEDS[name]:
                 continue
             plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
-            listed.append(Training(name, plan, folder / "runs" / f"{name}-{seed}"))
+            listed.append(StudyTraining(name, plan, folder / "runs" / f"{name}-{seed}"))
     return listed
 
 
 def train_all(
-    chosen: Sequence[Training], workers: int, report: Callable[[Training], object]
+    chosen: Sequence[StudyTraining], workers: int, report: Callable[[StudyTraining], object]
 ) -> None:
     """Train what is not trained yet; an interrupted training goes on where it was.
 
@@ -119,12 +119,12 @@ def train_all(
         report(waiting[index])
 
 
-def train_one(training: Training) -> None:
+def train_one(training: StudyTraining) -> None:
     """Carry out one training."""
     train(training.plan, training.folder, lambda steps, line: None, resume=training.begun)
 
 
-def ship(chosen: Sequence[Training], folder: Path, command: str) -> None:
+def ship(chosen: Sequence[StudyTraining], folder: Path, command: str) -> None:
     """Put each agent, as its seed 0, under its own name into a folder.
 
     Args:

@@ -23,7 +23,7 @@ from usm_gym.statistics import compare, interquartile_mean, interval
 from usm_gym.suites import NAMES, suite
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
-from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
+from usm_gym.task.metrics import MAX_ERROR, axes_of
 from usm_gym.task.scenario import Scenario
 
 MAIN = "operation"
@@ -49,7 +49,7 @@ class Lead:
     @classmethod
     def over(cls, worse: Evaluation, better: Evaluation) -> Self:
         """The lead of the better scores over the worse."""
-        compared = compare(total_error(worse.per_episode), total_error(better.per_episode))
+        compared = compare(worse.total_error, better.total_error)
         return cls(
             episodes=compared.episodes,
             probability=compared.improvement,
@@ -244,7 +244,7 @@ def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing
     """The rows of a suite: competitors first, the smaller error first."""
 
     def rank(pair: tuple[Contender, Evaluation]) -> tuple[bool, float]:
-        return pair[0].privileged, total_error(pair[1].per_episode).mean()
+        return pair[0].privileged, float(pair[1].total_error.mean())
 
     order = sorted(scores, key=rank)
     leads = {

@@ -6,26 +6,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from usm_gym.statistics import Comparison
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import StoredScenarios
 
-
-def scenario_of(value: Any) -> Scenario:
-    """A scenario, or one in JSON's types."""
-    return value if isinstance(value, Scenario) else Scenario.from_dict(value)
-
-
-# Written and read as a suite's scenarios are.
-AnyScenario = Annotated[
-    Scenario, PlainValidator(scenario_of), PlainSerializer(Scenario.to_dict, when_used="json")
-]
-Scenarios = Annotated[tuple[AnyScenario, ...], Field(min_length=1)]
 Failures = Annotated[int, Field(strict=True, ge=0)]
 
 
@@ -167,7 +156,7 @@ class EvaluationResult(Result):
     conditions_override: str | None
     settle_time: Number
     episodes: Count
-    scenarios: Scenarios
+    scenarios: StoredScenarios
     results: Mapping[str, CompetitorScores]
     refused: Mapping[str, str]
     provenance: Provenance

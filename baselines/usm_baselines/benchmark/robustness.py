@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Discriminator, Field, Tag
 
-from usm_baselines.benchmark.results import Scenarios, Scores, axes_in, require_alike
+from usm_baselines.benchmark.results import Scores, axes_in, require_alike
 from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal, shared_nominal
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import Evaluation
@@ -20,6 +20,7 @@ from usm_gym.robot import Robot
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.validation import Number, require, validated
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import StoredScenarios
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,7 @@ class RobustnessResult(Result):
     quantity: str
     label: str
     values: Annotated[tuple[Number, ...], Field(min_length=1)]
-    scenarios: Scenarios
+    scenarios: StoredScenarios
     results: Mapping[str, tuple[Point, ...]]
     provenance: Provenance
 

@@ -24,7 +24,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from usm_baselines.contender import Contender
-from usm_gym.evaluation import METRICS, Evaluation, evaluate, joined
+from usm_gym.evaluation import BATCH, Evaluation, evaluate, joined, metric_names
 from usm_gym.policy import Policy
 from usm_gym.robot import Robot
 from usm_gym.support import parallel
@@ -37,11 +37,10 @@ from usm_gym.support.validation import (
     in_one_line,
     require,
 )
-from usm_gym.task.nominal import Nominal, nominal_of
+from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Scenario
+from usm_gym.world import world_of
 
-# Episodes that a policy meets side by side; a multiple of the plant's lanes.
-BATCH = 64
 # How long the code of others may think in a batch, s.
 TIME_LIMIT, LONGEST_TIME = 240.0, 1e6
 
@@ -100,7 +99,7 @@ def shared_nominal(robot: Robot, scenarios: Sequence[Scenario]) -> Nominal:
     Raises:
         ValueError: If they do not agree in it.
     """
-    nominal, *others = {nominal_of(robot, scenario) for scenario in scenarios}
+    nominal, *others = {scenario.nominal for scenario in scenarios}
     require(not others, "scenarios", f"{len(others) + 1} kinds", "one nominal knowledge for all")
     return nominal
 
@@ -244,7 +243,8 @@ def _read(cache: Path | None, job: Job) -> Evaluation | None:
     try:
         kept = _KEPT.validate_python(read_json(file))
         names, episodes = list(kept.per_episode), len(job.scenarios)
-        require(names == list(METRICS), "per_episode", names, ", ".join(METRICS))
+        expected = metric_names(world_of(job.scenarios[0].body))
+        require(names == expected, "per_episode", names, ", ".join(expected))
         lengths = {len(kept.failed), *map(len, kept.per_episode.values())}
         require(lengths == {episodes}, "number of episodes", sorted(lengths), str(episodes))
     except (UsageError, ValidationError, OSError) as error:

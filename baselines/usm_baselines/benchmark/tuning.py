@@ -36,8 +36,8 @@ from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.conditions import FIELD, Conditions
-from usm_gym.task.metrics import total_error
-from usm_gym.task.scenario import Mode, Scenario, sample
+from usm_gym.task.sampling import sample
+from usm_gym.task.scenario import Mode, Scenario
 
 # Cost of thrust variation, mm per N/s. The front of error against variation comes from sweeping it.
 VARIATION_WEIGHT = 0.002
@@ -140,9 +140,8 @@ def objective(outcome: Evaluation | Refusal, weight: float = VARIATION_WEIGHT) -
     """
     if isinstance(outcome, Refusal):
         return FAILED
-    error = total_error(outcome.per_episode)
     variation = outcome.per_episode["thrust_variation"]
-    return float(np.mean(1e3 * error + weight * variation))
+    return float(np.mean(1e3 * outcome.total_error + weight * variation))
 
 
 def tune(

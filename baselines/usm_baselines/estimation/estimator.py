@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_baselines.estimation import kalman
-from usm_baselines.signals import Array, Signals, model_of, room_for_signals, sense
+from usm_baselines.signals import Array, Signals, model_of, sense, shared_size, signals_of
 from usm_gym.kernels.compile import compiled
 from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
 
 # Spectral densities of the noise on the acceleration (m/s^2 / sqrt(Hz)) and of that which drives
 # the disturbance (m/s^3 / sqrt(Hz)): those that `lqg` starts from.
@@ -19,11 +20,11 @@ ACCELERATION_NOISE, DISTURBANCE_NOISE = 1e-2, 0.3
 def estimate_all(state, model, linear, signals, estimates, innovation):
     """Sense, filter both axes, keep what the next call needs; see `Estimator.update`."""
     sense(state, model, signals)
-    thrusters = model.thruster_links.size
-    first = 1 + 2 * thrusters
+    thrusters = model.thrusters
+    first = 1 + model.axes * thrusters
     for b in range(innovation.shape[0]):
         state[b, 0] = 1.0
-        for axis in range(2):
+        for axis in range(model.axes):
             at = first + kalman.STATES * axis
             own = state[b, at : at + kalman.STATES]
             _, _, innovation[b, axis] = kalman.estimate(signals, model.mass, linear, b, axis, own)
@@ -40,9 +41,8 @@ class Estimator:
 
     def __init__(self, nominal: Nominal) -> None:
         """Compute the filter from nominal knowledge."""
-        self._model = model_of(nominal)
+        self._world, self._model = world_of(nominal.robot), model_of(nominal)
         self._linear = kalman.linear_model(nominal, ACCELERATION_NOISE, DISTURBANCE_NOISE)
-        self._thrusters = len(nominal.robot.thrusters)
 
     def update(
         self, observation: NDArray[np.float32], state: Array | None, start: NDArray[np.bool_]
@@ -60,11 +60,12 @@ class Estimator:
         """
         size = len(observation)
         if state is None:
-            new = np.zeros((size, 1 + 2 * self._thrusters + 2 * kalman.STATES))
+            own = self._model.axes * kalman.STATES
+            new = np.zeros((size, shared_size(self._model) + own))
         else:
             new = state.copy()
             new[start] = 0.0
-        signals = room_for_signals(observation, self._thrusters)
-        estimates, innovation = np.empty((size, 2, kalman.STATES)), np.empty((size, 2))
+        signals, axes = signals_of(observation, self._model, self._world), self._model.axes
+        estimates, innovation = np.empty((size, axes, kalman.STATES)), np.empty((size, axes))
         estimate_all(new, self._model, self._linear, signals, estimates, innovation)
         return signals, estimates, innovation, new

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_are
 
 from usm_gym.kernels.compile import piece
 from usm_gym.robot import Robot
@@ -56,7 +55,12 @@ class Linear(NamedTuple):
 
 
 def straight_body(robot: Robot) -> tuple[Array, Array]:
-    """Inertia (kg) and linear drag (N s/m) of the straight body along x and across it, (2,)."""
+    """Inertia (kg) and linear drag (N s/m) of the straight body along x and across it, (2,).
+
+    Raises:
+        ValueError: If the robot is not the planar one.
+    """
+    require(isinstance(robot, Robot), "robot", robot, "the planar robot")
     added = np.array([0.0, robot.added_mass])
     inertia = robot.total_mass + robot.links * added
     drag = robot.links * np.array([robot.tangential_drag, robot.normal_drag])
@@ -65,6 +69,8 @@ def straight_body(robot: Robot) -> tuple[Array, Array]:
 
 def sampled(damping: float, lag: float, h: float) -> Array:
     """The transition of one axis over a period h with u and w held, (4, 6)."""
+    from scipy.linalg import expm  # here, because scipy.linalg takes long to import
+
     lag = max(lag, SHORTEST_LAG * h)
     A = np.zeros((6, 6))
     A[ERROR, RATE] = 1.0
@@ -79,6 +85,8 @@ def process_noise(damping: float, h: float, acceleration: float, disturbance: fl
     C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on
     Automatic Control 23, 1978.
     """
+    from scipy.linalg import expm
+
     A = np.zeros((3, 3))
     A[ERROR, RATE] = 1.0
     A[RATE, [RATE, DISTURBANCE]] = -damping, 1.0
@@ -95,6 +103,8 @@ def filter_gain(transition: Array, noise: Array, measurement: float) -> Array:
         noise: Covariance of the process noise of a period, (3, 3).
         measurement: Standard deviation of the measurement, m.
     """
+    from scipy.linalg import solve_discrete_are
+
     A, C = transition[:3, :3], np.array([[1.0, 0.0, 0.0]])
     R = np.array([[measurement**2]])
     P = solve_discrete_are(A.T, C.T, noise, R)
@@ -161,7 +171,7 @@ def estimate(signals, mass, model, b, axis, state):
     """One period of the filter on what was measured of robot b and applied to it, in place.
 
     Args:
-        signals: `usm_baselines.laws.policy.Signals`.
+        signals: `usm_baselines.signals.Signals`.
         mass: Total mass m_t, kg.
         model: `Linear`.
         b: Which robot.

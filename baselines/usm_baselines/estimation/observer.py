@@ -13,6 +13,9 @@ from usm_gym.kernels.compile import piece
 from usm_gym.kernels.elementary import cube_root
 from usm_gym.support.validation import require
 
+# The numbers of its state in an axis: p1, p2, p3, and e, which its next step starts from.
+NAMES = ("error", "rate", "disturbance", "root")
+ERROR, RATE, DISTURBANCE, ROOT = range(len(NAMES))
 # Exponent of L in k2: that printed in the paper, and the one that homogeneity asks for.
 PRINTED, HOMOGENEOUS = 0.5, 2 / 3
 
@@ -110,19 +113,3 @@ def observe(implicit, started, y, u, velocity, h, k, state):
     if implicit:
         return implicit_observer(y, u, h, k, state)
     return explicit_observer(y, u, h, k, state)
-
-
-@piece
-def compensating_force(z1, z2, acceleration, mass, surface, u, state):
-    """The force (19), N, which makes sigma' = u for the estimated sigma = surface p1 + p2.
-
-    Args:
-        z1: First correction of the observer, m/s.
-        z2: Second correction of the observer, m/s^2.
-        acceleration: Acceleration of the reference, m/s^2.
-        mass: Total mass m_t, kg.
-        surface: lambda of (10), 1/s.
-        u: What sigma' is to be, m/s^2.
-        state: (p1, p2, p3, e) of the observer.
-    """
-    return mass * (-surface * (state[1] + z1) - state[2] - z2 + acceleration + u)

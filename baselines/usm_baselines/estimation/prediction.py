@@ -12,32 +12,27 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from usm_baselines.signals import Array, Model, Signals
+from usm_baselines.signals import Array, Signals, commanded
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
+from usm_gym.packing import body_row, plant_of
+from usm_gym.planar_world import PlanarWorld
 from usm_gym.plant.layout import *
-from usm_gym.plant.measure import (
-    JOINT_ANGLES,
-    JOINT_RATES,
-    JOINT_REFERENCE_ACCELERATIONS,
-    JOINT_REFERENCE_RATES,
-    JOINT_REFERENCES,
-    POSITION_ERROR,
-    REFERENCE_ACCELERATION,
-    REFERENCE_VELOCITY,
-    TAIL_ANGLE,
-    TAIL_RATE,
-    THRUSTER_COMMAND,
-    THRUSTER_LIMIT,
-    value,
-)
-from usm_gym.plant.motion import filter_coefficients, lag_share
 from usm_gym.plant.step import Plant, advance
+from usm_gym.robot import Robot
+from usm_gym.sensors import value
+from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.observation import ENTRY
+from usm_gym.world import world_of
 
-# Numbers at the start of a predictor's state: (e, v, d) of x and of y.
-ESTIMATES = 6
+# Axes of the plane that the robot is in; numbers at the start of a predictor's state, its NAMES in
+# each axis.
+AXES = len(PlanarWorld.axes)
+NAMES = ("error", "rate", "unmodelled")
+ESTIMATES = AXES * len(NAMES)
 # Physics steps of a prediction in a control period.
 SUBSTEPS = 5
 # The frequency that is assumed of the joint references' filter, rad/s.
@@ -45,111 +40,107 @@ REFERENCE_FREQUENCY = 9.0
 
 
 class NominalPlant(NamedTuple):
-    """The nominal robot in the form that kernels take.
+    """The nominal robot in the form that kernels take, and how its observations are read.
 
     Attributes:
         plant: What the plant's kernels take.
         row: The numbers of a robot that do not change, (rows,).
         frequency: Assumed frequency of the joint references' filter, rad/s.
+        starts: First index of each entry of the observation.
+        scale: Physical value over observed value of each number.
+        h: Control period, s.
     """
 
     plant: Plant
     row: Array
     frequency: float
+    starts: NDArray[np.int64]
+    scale: Array
+    h: float
 
 
 def nominal_plant(nominal: Nominal) -> NominalPlant:
-    """The nominal robot for kernels."""
-    robot = nominal.robot
-    links, h = robot.links, nominal.control_period / SUBSTEPS
-    row = np.zeros(rows(links, len(robot.thrusters)))
-    row[C_T : LAMBDA_3 + 1] = robot.hydrodynamic_coefficients
-    row[STIFFNESS], row[DAMPING] = robot.joint_stiffness, robot.joint_damping
-    row[JOINT_INERTIA] = h * robot.joint_damping + h**2 * robot.joint_stiffness
-    row[FILTER_DD : FILTER_DAMPING + 1] = filter_coefficients(REFERENCE_FREQUENCY, h)
-    row[SHIFT_TIME] = -1.0
-    row[LAG] = lag_share(nominal.thruster_time_constant, h)
-    side = row_of(SIDE, links)
-    row[side : side + links] = sides(links)
-    plant = Plant(
-        l=robot.half_length,
-        m=robot.link_mass,
-        J=robot.link_inertia,
-        implicit=h,
-        kirchhoff=1.0,
-        links=links,
-        thruster_links=robot.thruster_links,
-        thruster_is_normal=robot.thruster_is_normal,
-        h=h,
-        substeps=SUBSTEPS,
-        shifts=1,
-        moving_water=False,
+    """The nominal robot for kernels.
+
+    Raises:
+        ValueError: If it is not the planar robot.
+    """
+    robot, period = nominal.robot, nominal.control_period
+    require(isinstance(robot, Robot), "robot", type(robot).__name__, "the planar robot")
+    plant = plant_of(robot, period / SUBSTEPS, substeps=SUBSTEPS, shifts=1)
+    row = body_row(
+        robot,
+        plant,
+        filter_frequency=REFERENCE_FREQUENCY,
+        time_constant=nominal.thruster_time_constant,
     )
-    return NominalPlant(plant, row, REFERENCE_FREQUENCY)
+    row[SHIFT_TIME] = -1.0
+    layout = world_of(robot).layout
+    return NominalPlant(plant, row, REFERENCE_FREQUENCY, layout.starts, layout.scale, period)
 
 
 @piece
-def place_references(seen, model, frequency, block, lane):
+def place_references(seen, nominal, block, lane):
     """Set the joint references of a robot and the deflection that they are on their way to.
 
     Each joint has a share of one deflection D. The vectors of references, rates and accelerations
     are all multiples of the shares; the shares are taken from all three together.
     """
-    joints = model.links - 1
+    links = nominal.plant.links
+    joints = links - 1
     D, rate, acceleration = 0.0, 0.0, 0.0
     for i in range(joints):
-        D += value(seen, model, JOINT_REFERENCES, i)
-        rate += value(seen, model, JOINT_REFERENCE_RATES, i)
-        acceleration += value(seen, model, JOINT_REFERENCE_ACCELERATIONS, i)
-    w = frequency
+        D += value(seen, nominal, ENTRY.joint_references, i)
+        rate += value(seen, nominal, ENTRY.joint_reference_rates, i)
+        acceleration += value(seen, nominal, ENTRY.joint_reference_accelerations, i)
+    w = nominal.frequency
     by_rate, by_acceleration = rate / (w * w), acceleration / (w * w * w * w)
     size = D * D + rate * by_rate + acceleration * by_acceleration
     for i in range(joints):
-        part = D * value(seen, model, JOINT_REFERENCES, i)
-        part += by_rate * value(seen, model, JOINT_REFERENCE_RATES, i)
-        part += by_acceleration * value(seen, model, JOINT_REFERENCE_ACCELERATIONS, i)
-        block[(row_of(SHARE, model.links) + i) * WIDTH + lane] = part / max(size, 1e-30)
+        part = D * value(seen, nominal, ENTRY.joint_references, i)
+        part += by_rate * value(seen, nominal, ENTRY.joint_reference_rates, i)
+        part += by_acceleration * value(seen, nominal, ENTRY.joint_reference_accelerations, i)
+        block[(row_of(SHARE, links) + i) * WIDTH + lane] = part / max(size, 1e-30)
     block[DEFLECTION * WIDTH + lane] = D
     block[DEFLECTION_RATE * WIDTH + lane] = rate
     block[SHIFT_SIZE * WIDTH + lane] = D + (acceleration / w + 2.0 * rate) / w
 
 
 @piece
-def place(seen, model, nominal, state, applied, block, lane):
+def place(seen, nominal, state, applied, block, lane):
     """Put a robot where an observation and the estimates say it is.
 
     Args:
         seen: Observation.
-        model: Nominal knowledge for reading it.
         nominal: The nominal robot.
         state: State of the predictor, of the time of the observation.
         applied: The observation that tells the commands over the coming period.
         block: Block of the robot, (rows * WIDTH,).
         lane: Its place in the block.
     """
-    links, thrusters = model.links, model.thruster_links.size
+    links, thrusters = nominal.plant.links, nominal.plant.thruster_links.size
     for r in range(nominal.row.size):
         block[r * WIDTH + lane] = nominal.row[r]
-    theta = value(seen, model, TAIL_ANGLE, 0)
-    omega = value(seen, model, TAIL_RATE, 0)
+    theta = value(seen, nominal, ENTRY.tail_angle, 0)
+    omega = value(seen, nominal, ENTRY.tail_rate, 0)
     for i in range(links):
         if i > 0:
-            theta -= value(seen, model, JOINT_ANGLES, i - 1)
-            omega -= value(seen, model, JOINT_RATES, i - 1)
+            theta -= value(seen, nominal, ENTRY.joint_angles, i - 1)
+            omega -= value(seen, nominal, ENTRY.joint_rates, i - 1)
         block[(row_of(THETA, links) + i) * WIDTH + lane] = theta
         block[(row_of(OMEGA, links) + i) * WIDTH + lane] = omega
-    for axis in range(2):
+    for axis in range(AXES):
         e, v, d = state[3 * axis], state[3 * axis + 1], state[3 * axis + 2]
         block[(P_X + axis) * WIDTH + lane] = e
-        velocity = v + value(seen, model, REFERENCE_VELOCITY, axis)
+        velocity = v + value(seen, nominal, ENTRY.reference_velocity, axis)
         block[(V_X + axis) * WIDTH + lane] = velocity
         # All water accelerating by d accelerates the centre of mass by d and turns nothing.
         block[(WATER_AX + axis) * WIDTH + lane] = d
-    place_references(seen, model, nominal.frequency, block, lane)
-    limit = value(applied, model, THRUSTER_LIMIT, 0)
+    place_references(seen, nominal, block, lane)
+    limit = value(applied, nominal, ENTRY.thruster_limit, 0)
     first = first_command(links)
     for j in range(thrusters):
-        command = value(applied, model, THRUSTER_COMMAND, j) * limit
+        command = value(applied, nominal, ENTRY.thruster_command, j) * limit
         block[(first + j) * WIDTH + lane] = command
         block[(first + thrusters + j) * WIDTH + lane] = state[ESTIMATES + j]
 
@@ -163,106 +154,108 @@ def advance_all(blocks, plant):
 
 
 @piece
-def error_ahead(seen, model, time, axis, block, lane):
+def error_ahead(seen, nominal, time, axis, block, lane):
     """(error, rate) of a robot placed at `seen`, after `time`; the reference's jerk is left out."""
-    velocity = value(seen, model, REFERENCE_VELOCITY, axis)
-    acceleration = value(seen, model, REFERENCE_ACCELERATION, axis)
+    velocity = value(seen, nominal, ENTRY.reference_velocity, axis)
+    acceleration = value(seen, nominal, ENTRY.reference_acceleration, axis)
     e = block[(P_X + axis) * WIDTH + lane] - time * (velocity + 0.5 * time * acceleration)
     v = block[(V_X + axis) * WIDTH + lane] - velocity - time * acceleration
     return e, v
 
 
 @compiled
-def place_all(observation, model, nominal, state, past, blocks):
+def place_all(observation, nominal, state, past, blocks):
     """`place` every robot of a batch, lane by lane; lanes that are left over stay idle.
 
     Args:
         observation: Observations now, (batch, numbers).
-        model: Nominal knowledge for reading them.
         nominal: The nominal robot.
         state: State of the predictor, (batch, size).
         past: Whether to place them as they were a period ago, with the commands known by now.
         blocks: Where to write, (blocks, rows * WIDTH).
     """
-    last = ESTIMATES + model.thruster_links.size
+    last = ESTIMATES + nominal.plant.thruster_links.size
     for b in range(observation.shape[0]):
         seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         if past:
-            place(own[last:], model, nominal, own, seen, block, lane)
+            place(own[last:], nominal, own, seen, block, lane)
         else:
-            place(seen, model, nominal, own, seen, block, lane)
+            place(seen, nominal, own, seen, block, lane)
 
 
 @compiled
-def update(observation, started, model, correction, blocks, state):
+def update(observation, started, nominal, correction, blocks, state):
     """Bring the state of a batch to the present, from its blocks and the measured position."""
-    thrusters = model.thruster_links.size
+    thrusters = nominal.plant.thruster_links.size
     for b in range(observation.shape[0]):
         seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         before = own[ESTIMATES + thrusters :]
-        for axis in range(2):
-            y, estimate = value(seen, model, POSITION_ERROR, axis), own[3 * axis : 3 * axis + 3]
+        for axis in range(AXES):
+            y, estimate = (
+                value(seen, nominal, ENTRY.position_error, axis),
+                own[3 * axis : 3 * axis + 3],
+            )
             if started[b] == 0.0:
-                rate = -value(seen, model, REFERENCE_VELOCITY, axis)
+                rate = -value(seen, nominal, ENTRY.reference_velocity, axis)
                 estimate[0], estimate[1], estimate[2] = y, rate, 0.0
             else:
-                e, v = error_ahead(before, model, model.h, axis, block, lane)
+                e, v = error_ahead(before, nominal, nominal.h, axis, block, lane)
                 estimate[0] = e + correction[axis, 0] * (y - e)
                 estimate[1] = v + correction[axis, 1] * (y - e)
                 estimate[2] += correction[axis, 2] * (y - e)
         for j in range(thrusters):
-            row = first_command(model.links) + thrusters + j
+            row = first_command(nominal.plant.links) + thrusters + j
             own[ESTIMATES + j] = block[row * WIDTH + lane] if started[b] > 0.0 else 0.0
         before[:] = seen
 
 
 @compiled
-def read_ahead(observation, model, time, blocks, ahead):
+def read_ahead(observation, nominal, time, blocks, ahead):
     """Read (error, rate) of a batch off its blocks, `time` after the observations."""
     for b in range(observation.shape[0]):
-        for axis in range(2):
+        for axis in range(AXES):
             block, lane = blocks[b // WIDTH], b % WIDTH
-            ahead[b, axis] = error_ahead(observation[b], model, time, axis, block, lane)
+            ahead[b, axis] = error_ahead(observation[b], nominal, time, axis, block, lane)
 
 
 @piece
 def held_force(signals, model, b, axis):
     """Force, N, that the last commands of a robot make in an axis, its links being as they are."""
-    seen, force = signals.observation[b], 0.0
-    limit = value(seen, model, THRUSTER_LIMIT, 0)
-    for j in range(model.thruster_links.size):
-        command = value(seen, model, THRUSTER_COMMAND, j) * limit
-        force += signals.allocation[b, axis, j] * command
+    force = 0.0
+    for j in range(model.thrusters):
+        force += signals.allocation[b, axis, j] * commanded(signals.observation[b], model, j)
     return force
 
 
 class Predictor:
     """Estimates where the robots of a batch are, and foresees where they will be.
 
-    Its state is an array of numbers for each robot: (e, v, d) of x and of y, the forces of the
+    Its state is an array of numbers for each robot: (e, v, d) of each axis, the forces of the
     thrusters in N, the last observation.
 
     Attributes:
         size: How many numbers that is.
     """
 
-    def __init__(self, nominal: Nominal, model: Model, correction: Array) -> None:
+    def __init__(self, nominal: Nominal, correction: Array) -> None:
         """Keep the nominal robot.
 
         Args:
             nominal: Nominal knowledge.
-            model: The same for kernels.
             correction: Gains of the filter on (e, v, d), (2, 3).
+
+        Raises:
+            ValueError: If the robot is not the planar one.
         """
-        self._nominal, self._model, self._correction = nominal_plant(nominal), model, correction
-        self.size = ESTIMATES + len(nominal.robot.thrusters) + model.scale.size
+        self._nominal, self._correction = nominal_plant(nominal), correction
+        self.size = ESTIMATES + len(nominal.robot.thrusters) + self._nominal.scale.size
 
     def estimate(self, signals: Signals, state: Array) -> None:
         """Bring the state, (batch, size), to the present, in place."""
         blocks = self._blocks(signals, state, past=True)
         advance_all(blocks, self._nominal.plant)
         seen, started = signals.observation, signals.started
-        update(seen, started, self._model, self._correction, blocks, state)
+        update(seen, started, self._nominal, self._correction, blocks, state)
 
     def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
         """Where estimated robots go if their last commands are held.
@@ -275,11 +268,11 @@ class Predictor:
         ahead = np.empty((periods, len(seen), 2, 2))
         for i in range(periods):
             advance_all(blocks, self._nominal.plant)
-            read_ahead(seen, self._model, (i + 1) * self._model.h, blocks, ahead[i])
+            read_ahead(seen, self._nominal, (i + 1) * self._nominal.h, blocks, ahead[i])
         return ahead
 
     def _blocks(self, signals: Signals, state: Array, past: bool) -> Array:
         seen = signals.observation
         blocks = np.zeros((-(-len(seen) // WIDTH), self._nominal.row.size * WIDTH))
-        place_all(seen, self._model, self._nominal, state, past, blocks)
+        place_all(seen, self._nominal, state, past, blocks)
         return blocks

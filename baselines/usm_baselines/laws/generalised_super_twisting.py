@@ -18,88 +18,52 @@ algorithm with adaptive gains, European Control Conference 2020.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from usm_baselines.estimation.observer import (
-    HOMOGENEOUS,
-    compensating_force,
-    observe,
-    observer_gains,
-)
-from usm_baselines.laws.policy import HEADING_RANGE, ScriptedPolicy
-from usm_baselines.laws.super_twisting import adapt
+from usm_baselines.estimation.observer import ERROR, HOMOGENEOUS, RATE, observe, observer_gains
+from usm_baselines.laws.super_twisting import ALPHA, INTEGRAL, STATE, adapt, compensating_force
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
-from usm_baselines.space import Range, Space
+from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.task.nominal import Nominal
 
-_SHARED: Space = {
-    "observer_gain": Range(1e-2, 100.0, "m/s^3"),
-    "surface": Range(0.3, 30.0, "1/s"),
-    "linear": Range(0.1, 100.0, "(s/m)^(1/2)"),
-    "heading_gain": HEADING_RANGE,
-}
-GENERALISED_SPACE: Space = {
-    **_SHARED,
-    "k_1": Range(1e-3, 10.0, "(m/s)^(1/2)/s"),
-    "k_2": Range(1e-4, 10.0, "m/s^2"),
-}
-ADAPTIVE_SPACE: Space = {
-    **_SHARED,
-    "epsilon": Range(1e-3, 1.0, "(m/s)^(1/2)/s"),
-    "omega": Range(1e-3, 10.0, "(m/s)^(1/2)/s^2"),
-    "dead_zone": Range(1e-4, 0.1, "m/s"),
-}
+# What both forms share.
+OBSERVER_GAIN = Gain(25.0, "m/s^3", "L of the observer", tuned=(1e-2, 100.0), positive=True)
+SURFACE = Gain(0.6, "1/s", "lambda of (10)", tuned=(0.3, 30.0))
+LINEAR = Gain(
+    50.0, "(s/m)^(1/2)", "weight of the linear term beside the square root", tuned=(0.1, 100.0)
+)
 
 
 class GeneralisedGains(NamedTuple):
-    """Gains of the generalised super-twisting controller.
+    """Gains of the generalised super-twisting controller."""
 
-    Attributes:
-        observer_gain: L of the observer, m/s^3.
-        surface: lambda of (10), 1/s.
-        linear: Weight of the linear term beside the square root, (s/m)^(1/2).
-        k_1: Gain of the proportional half, (m/s)^(1/2)/s.
-        k_2: Gain of the integral half, m/s^2.
-        heading_gain: k_psi, N m/rad.
-    """
-
-    observer_gain: float = 25.0
-    surface: float = 0.6
-    linear: float = 50.0
-    k_1: float = 0.02
-    k_2: float = 0.015
-    heading_gain: float = 100.0
+    observer_gain: float = OBSERVER_GAIN
+    surface: float = SURFACE
+    linear: float = LINEAR
+    heading_gain: float = HEADING_GAIN
+    k_1: float = Gain(0.02, "(m/s)^(1/2)/s", "gain of the proportional half", tuned=(1e-3, 10.0))
+    k_2: float = Gain(0.015, "m/s^2", "gain of the integral half", tuned=(1e-4, 10.0))
 
 
 class AdaptiveGains(NamedTuple):
-    """Gains of the adaptive form: k_1 is alpha and k_2 is beta of (12)-(14) of the paper.
+    """Gains of the adaptive form: k_1 is alpha and k_2 is beta of (12)-(14) of the paper."""
 
-    Attributes:
-        observer_gain: L of the observer, m/s^3.
-        surface: lambda of (10), 1/s.
-        linear: Weight of the linear term beside the square root, (s/m)^(1/2).
-        epsilon: epsilon of (13).
-        beta_offset: lambda of (13), m/s^2.
-        gamma: gamma_1 of (12).
-        omega: omega_1 of (12).
-        dead_zone: alpha_m of (14), m/s.
-        alpha_start: alpha at the start.
-        heading_gain: k_psi, N m/rad.
-    """
-
-    observer_gain: float = 25.0
-    surface: float = 0.6
-    linear: float = 50.0
-    epsilon: float = 0.01
-    beta_offset: float = 0.015
-    gamma: float = 1.0
-    omega: float = 0.01
-    dead_zone: float = 0.03
-    alpha_start: float = 0.02
-    heading_gain: float = 100.0
+    observer_gain: float = OBSERVER_GAIN
+    surface: float = SURFACE
+    linear: float = LINEAR
+    heading_gain: float = HEADING_GAIN
+    epsilon: float = Gain(0.01, "(m/s)^(1/2)/s", "epsilon of (13)", tuned=(1e-3, 1.0))
+    beta_offset: float = Gain(0.015, "m/s^2", "lambda of (13)")
+    gamma: float = Gain(1.0, "1", "gamma_1 of (12)")
+    omega: float = Gain(0.01, "(m/s)^(1/2)/s^2", "omega_1 of (12)", tuned=(1e-3, 10.0))
+    dead_zone: float = Gain(
+        0.03, "m/s", "alpha_m of (14): below it alpha keeps still", tuned=(1e-4, 0.1)
+    )
+    alpha_start: float = Gain(0.02, "(m/s)^(1/2)/s", "alpha at the start")
 
 
 @piece
@@ -115,7 +79,7 @@ def implicit_generalised(sigma, h, k_1, k_2, linear, state):
         k_1: Gain of the proportional half.
         k_2: Gain of the integral half.
         linear: Weight of the linear term.
-        state: (v,) in an array; becomes that of the next step.
+        state: v at its beginning, advanced in place.
     """
     b = sigma + h * state[0]
     sliding = 0.5 * h * h * k_2
@@ -134,59 +98,55 @@ def implicit_generalised(sigma, h, k_1, k_2, linear, state):
 
 @compiled
 def generalised_super_twisting(signals, h, mass, gains, state, force):
-    """Observer and controller for a batch, both axes; fills in the force, (batch, 2)."""
+    """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
     k = observer_gains(gains.observer_gain, HOMOGENEOUS)
-    for b in range(force.shape[0]):
-        for axis in range(2):
-            own = state[b, axis]
-            started, y, u = signals.started[b], signals.y[b, axis], signals.u[b, axis]
-            velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
-            if started == 0.0:
-                own[4], own[5] = 0.0, gains.alpha_start
-            z1, z2 = observe(True, started, y, u, velocity, h, k, own)
-            sigma = gains.surface * own[0] + own[1]
-            alpha = own[5]
-            beta, own[5] = adapt(sigma, alpha, h, gains)
-            u = implicit_generalised(sigma, h, alpha, beta, gains.linear, own[4:])
-            force[b, axis] = compensating_force(z1, z2, acceleration, mass, gains.surface, u, own)
+    for b, axis in np.ndindex(force.shape):
+        own, started = state[b, axis], signals.started[b]
+        y, u = signals.y[b, axis], signals.u[b, axis]
+        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
+        if started == 0.0:
+            own[INTEGRAL], own[ALPHA] = 0.0, gains.alpha_start
+        z1, z2 = observe(True, started, y, u, velocity, h, k, own)
+        sigma = gains.surface * own[ERROR] + own[RATE]
+        alpha = own[ALPHA]
+        beta, own[ALPHA] = adapt(sigma, alpha, h, gains)
+        u = implicit_generalised(sigma, h, alpha, beta, gains.linear, own[INTEGRAL:])
+        force[b, axis] = compensating_force(z1, z2, acceleration, mass, gains.surface, u, own)
 
 
 class AdaptiveGeneralisedSuperTwisting(ScriptedPolicy):
-    """The generalised super-twisting controller with the paper's adaptation of its gains.
+    """The generalised super-twisting controller with the paper's adaptation of its gains."""
 
-    The law's state is (p1, p2, p3, e) of the observer, v and alpha for each axis.
-    """
-
-    law_size = 6
-    positive = ("observer_gain",)
+    Gains: type[Any] = AdaptiveGains
+    state = STATE
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
-        """Take gains other than the defaults by name, see `AdaptiveGains`."""
-        super().__init__(nominal, AdaptiveGains(**gains))
-        self._law = self.gains
+        """Take gains other than the defaults by name."""
+        super().__init__(nominal, **gains)
+        self._adaptive = self.gains
 
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """The control (19) with the generalised law."""
-        force = np.empty_like(signals.y)
         model = self._model
-        generalised_super_twisting(signals, model.h, model.mass, self._law, law_state, force)
-        return force
+        generalised_super_twisting(signals, model.h, model.mass, self._adaptive, state, force)
 
 
 class GeneralisedSuperTwisting(AdaptiveGeneralisedSuperTwisting):
     """The generalised super-twisting controller: the adaptive one, whose gains keep still."""
 
+    Gains = GeneralisedGains
+
     def __init__(self, nominal: Nominal, **gains: float) -> None:
-        """Take gains other than the defaults by name, see `GeneralisedGains`."""
-        ScriptedPolicy.__init__(self, nominal, GeneralisedGains(**gains))
+        """Take gains other than the defaults by name."""
+        super().__init__(nominal, **gains)
         own = self.gains
-        self._law = AdaptiveGains(
+        self._adaptive = AdaptiveGains(
             observer_gain=own.observer_gain,
             surface=own.surface,
             linear=own.linear,
+            heading_gain=own.heading_gain,
             epsilon=0.0,
             beta_offset=own.k_2,
             omega=0.0,
             alpha_start=own.k_1,
-            heading_gain=own.heading_gain,
         )

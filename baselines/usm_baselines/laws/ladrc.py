@@ -13,35 +13,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from usm_baselines.laws.policy import HEADING_RANGE, ScriptedPolicy
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
-from usm_baselines.space import Range, Space
+from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.elementary import exp_of_negative
-from usm_gym.task.nominal import Nominal
-
-LADRC_SPACE: Space = {
-    "observer_bandwidth": Range(2.0, 200.0, "rad/s"),
-    "controller_bandwidth": Range(0.5, 30.0, "rad/s"),
-    "inertia": Range(5.0, 100.0, "kg"),
-    "heading_gain": HEADING_RANGE,
-}
 
 
 class LADRCGains(NamedTuple):
-    """Gains of linear active-disturbance-rejection control.
+    """Gains of linear active-disturbance-rejection control."""
 
-    Attributes:
-        observer_bandwidth: omega_o, rad/s.
-        controller_bandwidth: omega_c, rad/s.
-        inertia: 1 / b_0, force over the acceleration it is taken to cause, kg.
-        heading_gain: k_psi, N m/rad.
-    """
+    observer_bandwidth: float = Gain(
+        60.0, "rad/s", "omega_o of the observer", tuned=(2.0, 200.0), positive=True
+    )
+    controller_bandwidth: float = Gain(4.0, "rad/s", "omega_c of the loop", tuned=(0.5, 30.0))
+    inertia: float = Gain(
+        17.0,
+        "kg",
+        "1 / b_0: force over the acceleration that it is taken to cause",
+        tuned=(5.0, 100.0),
+        positive=True,
+    )
+    heading_gain: float = HEADING_GAIN
 
-    observer_bandwidth: float = 60.0
-    controller_bandwidth: float = 4.0
-    inertia: float = 17.0
-    heading_gain: float = 100.0
+
+# m, m/s and m/s^2.
+STATE = ("error", "rate", "disturbance")
+ERROR, RATE, DISTURBANCE = range(len(STATE))
 
 
 @piece
@@ -65,50 +63,40 @@ def extended_state(y, u, h, correction, state):
         u: Acceleration that was asked for over the past period, m/s^2.
         h: Control period, s.
         correction: Gains of the observer.
-        state: (error, its rate, disturbance as an acceleration), advanced in place.
+        state: The numbers of `STATE`, advanced in place.
     """
-    a = state[2] + u
-    e = state[0] + h * state[1] + 0.5 * h * h * a
-    v = state[1] + h * a
+    a = state[DISTURBANCE] + u
+    e = state[ERROR] + h * state[RATE] + 0.5 * h * h * a
+    v = state[RATE] + h * a
     innovation = y - e
-    state[0] = e + correction[0] * innovation
-    state[1] = v + correction[1] * innovation
-    state[2] += correction[2] * innovation
+    state[ERROR] = e + correction[ERROR] * innovation
+    state[RATE] = v + correction[RATE] * innovation
+    state[DISTURBANCE] += correction[DISTURBANCE] * innovation
 
 
 @compiled
 def ladrc(signals, h, mass, gains, state, force):
-    """Observer and law for a batch, both axes; fills in the force, (batch, 2)."""
+    """Observer and law for a batch; fills in the force, N, (batch, axes)."""
     correction = observer_correction(gains.observer_bandwidth, h)
     omega = gains.controller_bandwidth
-    for b in range(force.shape[0]):
-        for axis in range(2):
-            own, acceleration = state[b, axis], signals.acceleration[b, axis]
-            if signals.started[b] == 0.0:
-                own[0], own[1], own[2] = signals.y[b, axis], -signals.velocity[b, axis], 0.0
-            else:
-                applied = mass * (signals.u[b, axis] + acceleration)
-                u = applied / gains.inertia - acceleration
-                extended_state(signals.y[b, axis], u, h, correction, own)
-            u_0 = -omega * omega * own[0] - 2.0 * omega * own[1]
-            force[b, axis] = gains.inertia * (u_0 - own[2] + acceleration)
+    for b, axis in np.ndindex(force.shape):
+        own, acceleration = state[b, axis], signals.acceleration[b, axis]
+        y, velocity = signals.y[b, axis], signals.velocity[b, axis]
+        if signals.started[b] == 0.0:
+            own[ERROR], own[RATE], own[DISTURBANCE] = y, -velocity, 0.0
+        else:
+            applied = mass * (signals.u[b, axis] + acceleration)
+            extended_state(y, applied / gains.inertia - acceleration, h, correction, own)
+        u_0 = -omega * omega * own[ERROR] - 2.0 * omega * own[RATE]
+        force[b, axis] = gains.inertia * (u_0 - own[DISTURBANCE] + acceleration)
 
 
 class LADRC(ScriptedPolicy):
-    """Linear active-disturbance-rejection control.
+    """Linear active-disturbance-rejection control."""
 
-    The law's state is (error, its rate, disturbance) for each axis, in m and s.
-    """
+    Gains = LADRCGains
+    state = STATE
 
-    law_size = 3
-    positive = ("observer_bandwidth", "inertia")
-
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
-        """Take gains other than the defaults by name, see `LADRCGains`."""
-        super().__init__(nominal, LADRCGains(**gains))
-
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """Observe, cancel, and place the poles of what is left."""
-        force = np.empty_like(signals.y)
-        ladrc(signals, self._model.h, self._model.mass, self.gains, law_state, force)
-        return force
+        ladrc(signals, self._model.h, self._model.mass, self.gains, state, force)

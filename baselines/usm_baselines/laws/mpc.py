@@ -18,39 +18,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from usm_baselines.estimation import kalman
+from usm_baselines.estimation import kalman, prediction
 from usm_baselines.estimation.kalman import COMMAND, ERROR, RATE, THRUST
 from usm_baselines.estimation.prediction import Predictor, held_force
-from usm_baselines.laws.policy import HEADING_RANGE, ScriptedPolicy
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
-from usm_baselines.space import Range, Space
+from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled
 from usm_gym.task.nominal import Nominal
 
-MPC_SPACE: Space = {
-    "acceleration_noise": Range(1e-4, 1e-1, "m/s^2 / sqrt(Hz)"),
-    "disturbance_noise": Range(1e-3, 1.0, "m/s^3 / sqrt(Hz)"),
-    "variation_weight": Range(1e-6, 1e-3, "m/N"),
-    "heading_gain": HEADING_RANGE,
-}
-
 
 class MPCGains(NamedTuple):
-    """Gains of the predictive controller.
+    """Gains of the predictive controller."""
 
-    Attributes:
-        acceleration_noise: As in `lqg.LQGGains`.
-        disturbance_noise: As in `lqg.LQGGains`.
-        variation_weight: As in `lqg.LQGGains`.
-        horizon: How far it looks ahead, s.
-        heading_gain: k_psi, N m/rad.
-    """
-
-    acceleration_noise: float = 1e-2
-    disturbance_noise: float = 0.05
-    variation_weight: float = 5e-5
-    horizon: float = 0.2
-    heading_gain: float = 100.0
+    acceleration_noise: float = Gain(
+        1e-2,
+        "m/s^2 / sqrt(Hz)",
+        "spectral density of the noise on the acceleration",
+        tuned=(1e-4, 1e-1),
+        positive=True,
+    )
+    disturbance_noise: float = Gain(
+        0.05,
+        "m/s^3 / sqrt(Hz)",
+        "spectral density of the noise that drives the disturbance",
+        tuned=(1e-3, 1.0),
+        positive=True,
+    )
+    variation_weight: float = Gain(
+        5e-5,
+        "m/N",
+        "error that is as bad as a change of the force by 1 N in a period",
+        tuned=(1e-6, 1e-3),
+        positive=True,
+    )
+    horizon: float = Gain(0.2, "s", "how far it looks ahead", positive=True)
+    heading_gain: float = HEADING_GAIN
 
 
 def forced_response(transition: Array, periods: int) -> Array:
@@ -81,32 +84,34 @@ def receding_gain(transition: Array, periods: int, weight: float) -> Array:
 
 @compiled
 def receding(signals, model, inertia, gain, ahead, force):
-    """Add the first change to the force of the held commands; fills in the force, (batch, 2)."""
-    for b in range(force.shape[0]):
-        for axis in range(2):
-            total = held_force(signals, model, b, axis)
-            for i in range(ahead.shape[0]):
-                total -= inertia[axis] * gain[axis, i] * ahead[i, b, axis, 0]
-            force[b, axis] = total
+    """Add the first change to the force of the held commands; fills in the force, (batch, axes)."""
+    for b, axis in np.ndindex(force.shape):
+        total = held_force(signals, model, b, axis)
+        for i in range(ahead.shape[0]):
+            total -= inertia[axis] * gain[axis, i] * ahead[i, b, axis, 0]
+        force[b, axis] = total
 
 
 class MPC(ScriptedPolicy):
     """Predictive control with measured joint motion and known joint references.
 
-    The law's state is that of `prediction.Predictor`.
+    It keeps the state of a `Predictor`.
     """
 
-    positive = ("variation_weight", "horizon")
+    Gains = MPCGains
+    state = prediction.NAMES
+    shown = ("rate", "unmodelled")
+    planar = True
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
-        """Compute the gains; gains other than the defaults by name, see `MPCGains`."""
-        super().__init__(nominal, MPCGains(**gains))
+        """Compute the gains of filter and regulator; gains other than the defaults by name."""
+        super().__init__(nominal, **gains)
         linear = kalman.linear_model(
             nominal, self.gains.acceleration_noise, self.gains.disturbance_noise
         )
         self._periods = max(1, round(self.gains.horizon / nominal.control_period))
         self._inertia = linear.inertia
-        self._predictor = Predictor(nominal, self._model, linear.correction)
+        self._predictor = Predictor(nominal, linear.correction)
         weights = self.gains.variation_weight * linear.inertia
         self._gain = np.stack(
             [
@@ -120,10 +125,8 @@ class MPC(ScriptedPolicy):
         """The state of the predictor."""
         return (self._predictor.size,)
 
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """Estimate, foresee, correct."""
-        self._predictor.estimate(signals, law_state)
-        ahead = self._predictor.foresee(signals, law_state, self._periods)
-        force = np.empty_like(signals.y)
+        self._predictor.estimate(signals, state)
+        ahead = self._predictor.foresee(signals, state, self._periods)
         receding(signals, self._model, self._inertia, self._gain, ahead, force)
-        return force

@@ -14,36 +14,37 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_baselines.estimation import kalman
 from usm_baselines.laws.mpc import receding, receding_gain
-from usm_baselines.laws.policy import ScriptedPolicy
+from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Array, Signals
+from usm_baselines.space import Gain
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 
 
 class OracleGains(NamedTuple):
-    """Gains of the oracle.
+    """Gains of the oracle."""
 
-    Attributes:
-        variation_weight: Error that is as bad as a change of the force by 1 N in a period, m/N.
-        horizon: How far it looks ahead, s.
-        heading_gain: k_psi, N m/rad.
-    """
-
-    variation_weight: float = 3e-6
-    horizon: float = 0.2
-    heading_gain: float = 100.0
+    variation_weight: float = Gain(
+        3e-6,
+        "m/N",
+        "error that is as bad as a change of the force by 1 N in a period",
+        positive=True,
+    )
+    horizon: float = Gain(0.2, "s", "how far it looks ahead", positive=True)
+    heading_gain: float = Gain(100.0, "N m/rad", "heading gain k_psi")
 
 
 class Oracle(ScriptedPolicy):
     """Predictive control that is given the true state: no competitor."""
 
+    Gains = OracleGains
     privileged = True
-    positive = ("variation_weight", "horizon")
+    planar = True
 
     def __init__(self, nominal: Nominal, **gains: float) -> None:
-        """Compute the gains; gains other than the defaults by name, see `OracleGains`."""
-        super().__init__(nominal, OracleGains(**gains))
+        """Compute the gain of the regulator; gains other than the defaults by name."""
+        super().__init__(nominal, **gains)
         self._inertia, drag = kalman.straight_body(nominal.robot)
         h, lag = nominal.control_period, nominal.thruster_time_constant
         self._periods = max(1, round(self.gains.horizon / h))
@@ -82,17 +83,15 @@ class Oracle(ScriptedPolicy):
         self._copy = self._copy_of(snapshot)
         return super().predict(observation, state, episode_start, deterministic)
 
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """Run ahead with the commands held, and correct what comes of it."""
         copy: Any = self._copy
-        held = (copy.command / copy.limit[:, np.newaxis]).astype(np.float32)
-        ahead = np.empty((self._periods, copy.size, 2, 1))
+        held = (copy.read("command") / copy.limit[:, np.newaxis]).astype(np.float32)
+        ahead = np.empty((self._periods, *force.shape, 1))
         for period in ahead:
             copy.step(held)
             period[:, :, 0] = copy.error
-        force = np.empty_like(signals.y)
         receding(signals, self._model, self._inertia, self._gain, ahead, force)
-        return force
 
     def _copy_of(self, snapshot: Any) -> Simulation:
         copy, scenarios = self._copy, snapshot.scenarios
@@ -102,6 +101,6 @@ class Oracle(ScriptedPolicy):
             or copy.size != len(scenarios)
             or copy.scenarios[0].conditions.timing != timing
         ):
-            copy = Simulation(self.nominal.robot, scenarios)
+            copy = Simulation(scenarios)
         copy.restore(snapshot)
         return copy

@@ -6,15 +6,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from usm_baselines.estimation.observer import (
-    check_exponent,
-    compensating_force,
-    observe,
-    observer_gains,
-)
-from usm_baselines.laws.policy import HEADING_RANGE, ScriptedPolicy
+from usm_baselines.estimation import observer
+from usm_baselines.estimation.observer import ERROR, RATE, check_exponent, observe, observer_gains
+from usm_baselines.laws.super_twisting import compensating_force
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
-from usm_baselines.space import Range, Space
+from usm_baselines.space import Gain, Range, Space, space_of
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
@@ -23,47 +20,38 @@ Reading = Literal["force", "mass", "observer"]
 READINGS: tuple[Reading, ...] = ("force", "mass", "observer")
 FORCE, MASS, OBSERVER = range(3)
 
-PD_SPACES: dict[Reading, Space] = {
-    "force": {
-        "k_p": Range(30.0, 30000.0, "N/m"),
-        "k_d": Range(10.0, 3000.0, "N s/m"),
-        "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
-        "heading_gain": HEADING_RANGE,
-    },
-    "mass": {
-        "k_p": Range(3.0, 3000.0, "1/s^2"),
-        "k_d": Range(1.0, 300.0, "1/s"),
-        "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
-        "heading_gain": HEADING_RANGE,
-    },
-    "observer": {
-        "k_p": Range(0.3, 300.0, "1/s^2"),
-        "k_d": Range(0.1, 30.0, "1/s"),
-        "observer_gain": Range(1e-2, 1000.0, "m/s^3"),
-        "surface": Range(0.1, 30.0, "1/s"),
-        "heading_gain": HEADING_RANGE,
-    },
-}
-
 
 class PDGains(NamedTuple):
     """Gains of the PD controller, those of section 5.2.2 by default.
 
-    Attributes:
-        k_p: Proportional gain: N/m in the reading "force", 1/s^2 in the others.
-        k_d: Derivative gain: N s/m in the reading "force", 1/s in the others.
-        observer_gain: L of the observer, m/s^3.
-        k2_exponent: Exponent of L in k2: 0.5 as printed, or 2/3.
-        surface: lambda of (19), 1/s; for the reading "observer" only.
-        heading_gain: k_psi, N m/rad.
+    In the readings "mass" and "observer" k_p is in 1/s^2 and k_d in 1/s.
     """
 
-    k_p: float = 200.0
-    k_d: float = 6.0
-    observer_gain: float = 55.0
-    k2_exponent: float = 0.5
-    surface: float = 1.0
-    heading_gain: float = 100.0
+    k_p: float = Gain(200.0, "N/m", "proportional gain", tuned=(30.0, 30000.0))
+    k_d: float = Gain(6.0, "N s/m", "derivative gain", tuned=(10.0, 3000.0))
+    observer_gain: float = Gain(
+        55.0, "m/s^3", "L of the observer", tuned=(1e-2, 1000.0), positive=True
+    )
+    k2_exponent: float = Gain(0.5, "1", "exponent of L in k2: 0.5 as printed, or 2/3")
+    surface: float = Gain(1.0, "1/s", 'lambda of (19); for the reading "observer" only')
+    heading_gain: float = HEADING_GAIN
+
+
+# Where the gains of each reading are tuned.
+SPACES: dict[Reading, Space] = {
+    "force": space_of(PDGains),
+    "mass": space_of(
+        PDGains,
+        k_p=Range(3.0, 3000.0, "1/s^2"),
+        k_d=Range(1.0, 300.0, "1/s"),
+    ),
+    "observer": space_of(
+        PDGains,
+        k_p=Range(0.3, 300.0, "1/s^2"),
+        k_d=Range(0.1, 30.0, "1/s"),
+        surface=Range(0.1, 30.0, "1/s"),
+    ),
+}
 
 
 @piece
@@ -77,9 +65,9 @@ def pd_force(z1, z2, acceleration, mass, gains, reading, state):
         mass: Total mass m_t, kg.
         gains: Gains.
         reading: FORCE, MASS or OBSERVER.
-        state: The observer's four numbers.
+        state: The observer's numbers.
     """
-    u_pd = -gains.k_d * state[1] - gains.k_p * state[0]
+    u_pd = -gains.k_d * state[RATE] - gains.k_p * state[ERROR]
     if reading == FORCE:
         return u_pd
     if reading == MASS:
@@ -89,22 +77,14 @@ def pd_force(z1, z2, acceleration, mass, gains, reading, state):
 
 @compiled
 def pd(signals, h, mass, gains, reading, state, force):
-    """Observer and controller for a batch, both axes; fills in the force, (batch, 2)."""
+    """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
     k = observer_gains(gains.observer_gain, gains.k2_exponent)
-    for b in range(force.shape[0]):
-        for axis in range(2):
-            z1, z2 = observe(
-                True,
-                signals.started[b],
-                signals.y[b, axis],
-                signals.u[b, axis],
-                signals.velocity[b, axis],
-                h,
-                k,
-                state[b, axis],
-            )
-            acceleration = signals.acceleration[b, axis]
-            force[b, axis] = pd_force(z1, z2, acceleration, mass, gains, reading, state[b, axis])
+    for b, axis in np.ndindex(force.shape):
+        own, started = state[b, axis], signals.started[b]
+        y, u = signals.y[b, axis], signals.u[b, axis]
+        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
+        z1, z2 = observe(True, started, y, u, velocity, h, k, own)
+        force[b, axis] = pd_force(z1, z2, acceleration, mass, gains, reading, own)
 
 
 class PD(ScriptedPolicy):
@@ -117,19 +97,18 @@ class PD(ScriptedPolicy):
       observer's estimate then cancels every disturbance.
     """
 
-    law_size = 4
-    positive = ("observer_gain",)
+    Gains = PDGains
+    state = observer.NAMES
+    shown = ("rate", "disturbance")
 
     def __init__(self, nominal: Nominal, reading: Reading = "force", **gains: float) -> None:
-        """Take gains other than the paper's by name, see `PDGains`."""
-        super().__init__(nominal, PDGains(**gains))
+        """Take a reading, and gains other than the paper's by name."""
+        super().__init__(nominal, **gains)
         check_exponent(self.gains.k2_exponent)
         require(reading in READINGS, "reading", reading, ", ".join(READINGS))
         self._reading = READINGS.index(reading)
 
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """The control (21)."""
-        force = np.empty_like(signals.y)
         model = self._model
-        pd(signals, model.h, model.mass, self.gains, self._reading, law_state, force)
-        return force
+        pd(signals, model.h, model.mass, self.gains, self._reading, state, force)

@@ -11,40 +11,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from usm_baselines.laws.policy import HEADING_RANGE, ScriptedPolicy
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
-from usm_baselines.space import Range, Space
+from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
-from usm_gym.task.nominal import Nominal
-
-PID_SPACE: Space = {
-    "k_p": Range(30.0, 30000.0, "N/m"),
-    "k_i": Range(10.0, 100000.0, "N/(m s)"),
-    "k_d": Range(10.0, 3000.0, "N s/m"),
-    "derivative_time": Range(1e-3, 0.3, "s"),
-    "heading_gain": HEADING_RANGE,
-}
-
-# The law's state in one axis.
-INTEGRAL, DERIVATIVE, LAST_ERROR, ASKED = range(4)
 
 
 class PIDGains(NamedTuple):
-    """Gains of the PID controller.
+    """Gains of the PID controller."""
 
-    Attributes:
-        k_p: Proportional gain, N/m.
-        k_i: Integral gain, N/(m s).
-        k_d: Derivative gain, N s/m.
-        derivative_time: Time constant of the derivative's filter, s.
-        heading_gain: k_psi, N m/rad.
-    """
+    k_p: float = Gain(1300.0, "N/m", "proportional gain", tuned=(30.0, 30000.0))
+    k_i: float = Gain(10000.0, "N/(m s)", "integral gain", tuned=(10.0, 100000.0))
+    k_d: float = Gain(400.0, "N s/m", "derivative gain", tuned=(10.0, 3000.0), positive=True)
+    derivative_time: float = Gain(
+        0.003, "s", "time constant of the derivative's filter", tuned=(1e-3, 0.3)
+    )
+    heading_gain: float = HEADING_GAIN
 
-    k_p: float = 1300.0
-    k_i: float = 10000.0
-    k_d: float = 400.0
-    derivative_time: float = 0.003
-    heading_gain: float = 100.0
+
+# Integral and derivative part of the force, N; last error, m; force that was asked for, N.
+STATE = ("integral", "derivative", "last_error", "asked")
+INTEGRAL, DERIVATIVE, LAST_ERROR, ASKED = range(len(STATE))
 
 
 @piece
@@ -58,8 +45,7 @@ def pid_force(started, y, applied, velocity, h, gains, state):
         velocity: Velocity of the reference, m/s, for the start from rest.
         h: Control period, s.
         gains: Gains.
-        state: (integral and derivative part of the force, N; last error, m; force asked for, N),
-            advanced in place.
+        state: The numbers of `STATE`, advanced in place.
     """
     if started == 0.0:
         state[INTEGRAL], state[DERIVATIVE] = 0.0, gains.k_d * velocity
@@ -77,32 +63,20 @@ def pid_force(started, y, applied, velocity, h, gains, state):
 
 @compiled
 def pid(signals, h, mass, gains, state, force):
-    """The law for a batch, both axes; fills in the force, (batch, 2)."""
-    for b in range(force.shape[0]):
-        for axis in range(2):
-            force[b, axis] = pid_force(
-                signals.started[b],
-                signals.y[b, axis],
-                mass * (signals.u[b, axis] + signals.acceleration[b, axis]),
-                signals.velocity[b, axis],
-                h,
-                gains,
-                state[b, axis],
-            )
+    """The law for a batch; fills in the force, N, (batch, axes)."""
+    for b, axis in np.ndindex(force.shape):
+        started, own = signals.started[b], state[b, axis]
+        y, velocity = signals.y[b, axis], signals.velocity[b, axis]
+        applied = mass * (signals.u[b, axis] + signals.acceleration[b, axis])
+        force[b, axis] = pid_force(started, y, applied, velocity, h, gains, own)
 
 
 class PID(ScriptedPolicy):
     """F = -(k_p e + k_i integral of e + k_d e'), e the measured position error."""
 
-    law_size = 4
-    positive = ("k_d",)
+    Gains = PIDGains
+    state = STATE
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
-        """Take gains other than the defaults by name, see `PIDGains`."""
-        super().__init__(nominal, PIDGains(**gains))
-
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """The law."""
-        force = np.empty_like(signals.y)
-        pid(signals, self._model.h, self._model.mass, self.gains, law_state, force)
-        return force
+        pid(signals, self._model.h, self._model.mass, self.gains, state, force)

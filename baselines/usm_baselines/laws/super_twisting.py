@@ -6,56 +6,59 @@ from typing import NamedTuple
 
 import numpy as np
 
+from usm_baselines.estimation import observer
 from usm_baselines.estimation.observer import (
+    DISTURBANCE,
+    ERROR,
+    RATE,
     check_exponent,
-    compensating_force,
     observe,
     observer_gains,
 )
-from usm_baselines.laws.policy import ScriptedPolicy
+from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Array, Signals
-from usm_baselines.space import Range, Space
+from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 
-SUPER_TWISTING_SPACE: Space = {
-    "observer_gain": Range(1e-2, 100.0, "m/s^3"),
-    "surface": Range(0.3, 30.0, "1/s"),
-    "epsilon": Range(1e-3, 1.0, "(m/s)^(1/2)/s"),
-    "beta_offset": Range(1e-4, 10.0, "m/s^2"),
-    "omega": Range(1e-3, 10.0, "(m/s)^(1/2)/s^2"),
-    "dead_zone": Range(1e-4, 0.1, "m/s"),
-    "alpha_start": Range(1e-2, 10.0, "(m/s)^(1/2)/s"),
-}
-
 
 class SuperTwistingGains(NamedTuple):
-    """Gains of the adaptive STA, those of section 5.2.1 by default.
+    """Gains of the adaptive super-twisting controller, those of section 5.2.1 by default."""
 
-    Attributes:
-        observer_gain: L of the observer, m/s^3; bounds the rate of the disturbance.
-        k2_exponent: Exponent of L in k2: 0.5 as printed, or 2/3.
-        surface: lambda of the sliding variable (10), 1/s.
-        epsilon: epsilon of (13).
-        beta_offset: lambda of (13), which the paper gives the same letter as that of (10).
-        gamma: gamma_1 of (12).
-        omega: omega_1 of (12).
-        dead_zone: alpha_m of (14), m/s: below it alpha keeps still.
-        alpha_start: alpha at the start, which the paper does not print.
-        heading_gain: k_psi, N m/rad.
-    """
+    observer_gain: float = Gain(
+        55.0,
+        "m/s^3",
+        "L of the observer; bounds the rate of the disturbance",
+        tuned=(1e-2, 100.0),
+        positive=True,
+    )
+    k2_exponent: float = Gain(0.5, "1", "exponent of L in k2: 0.5 as printed, or 2/3")
+    surface: float = Gain(1.0, "1/s", "lambda of the sliding variable (10)", tuned=(0.3, 30.0))
+    epsilon: float = Gain(1.0, "(m/s)^(1/2)/s", "epsilon of (13)", tuned=(1e-3, 1.0))
+    beta_offset: float = Gain(
+        1.0,
+        "m/s^2",
+        "lambda of (13), to which the paper gives the same letter as to that of (10)",
+        tuned=(1e-4, 10.0),
+    )
+    gamma: float = Gain(1.0, "1", "gamma_1 of (12)")
+    omega: float = Gain(8.0, "(m/s)^(1/2)/s^2", "omega_1 of (12)", tuned=(1e-3, 10.0))
+    dead_zone: float = Gain(
+        0.05, "m/s", "alpha_m of (14): below it alpha keeps still", tuned=(1e-4, 0.1)
+    )
+    alpha_start: float = Gain(
+        0.0,
+        "(m/s)^(1/2)/s",
+        "alpha at the start, which the paper does not print",
+        tuned=(1e-2, 10.0),
+    )
+    heading_gain: float = Gain(100.0, "N m/rad", "heading gain k_psi")
 
-    observer_gain: float = 55.0
-    k2_exponent: float = 0.5
-    surface: float = 1.0
-    epsilon: float = 1.0
-    beta_offset: float = 1.0
-    gamma: float = 1.0
-    omega: float = 8.0
-    dead_zone: float = 0.05
-    alpha_start: float = 0.0
-    heading_gain: float = 100.0
+
+# The observer's numbers; v of (11), m/s^2; alpha, m^(1/2)/s^(3/2).
+STATE = (*observer.NAMES, "integral", "alpha")
+*_, INTEGRAL, ALPHA = range(len(STATE))
 
 
 @piece
@@ -101,6 +104,22 @@ def explicit_super_twisting(sigma, h, gains, v, alpha):
 
 
 @piece
+def compensating_force(z1, z2, acceleration, mass, surface, u, state):
+    """The force (19), N, which makes sigma' = u for the estimated sigma = surface p1 + p2.
+
+    Args:
+        z1: First correction of the observer, m/s.
+        z2: Second correction of the observer, m/s^2.
+        acceleration: Acceleration of the reference, m/s^2.
+        mass: Total mass m_t, kg.
+        surface: lambda of (10), 1/s.
+        u: What sigma' is to be, m/s^2.
+        state: The observer's numbers.
+    """
+    return mass * (-surface * (state[RATE] + z1) - state[DISTURBANCE] - z2 + acceleration + u)
+
+
+@piece
 def super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, state):
     """Force on the centre of mass in one axis, (19), N.
 
@@ -112,50 +131,42 @@ def super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, state):
         mass: Total mass m_t, kg.
         gains: Gains.
         implicit: Whether to discretise implicitly.
-        state: The observer's four numbers, v and alpha; these two are advanced in place.
+        state: The numbers of `STATE`; v and alpha are advanced in place.
     """
-    sigma = gains.surface * state[0] + state[1]
+    sigma = gains.surface * state[ERROR] + state[RATE]
+    v, alpha = state[INTEGRAL], state[ALPHA]
     if implicit:
-        u_sta, state[4], state[5] = implicit_super_twisting(sigma, h, gains, state[4], state[5])
+        u_sta, v, alpha = implicit_super_twisting(sigma, h, gains, v, alpha)
     else:
-        u_sta, state[4], state[5] = explicit_super_twisting(sigma, h, gains, state[4], state[5])
+        u_sta, v, alpha = explicit_super_twisting(sigma, h, gains, v, alpha)
+    state[INTEGRAL], state[ALPHA] = v, alpha
     return compensating_force(z1, z2, acceleration, mass, gains.surface, u_sta, state)
 
 
 @compiled
 def super_twisting(signals, h, mass, gains, implicit, state, force):
-    """Observer and controller for a batch, both axes; fills in the force, (batch, 2)."""
+    """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
     k = observer_gains(gains.observer_gain, gains.k2_exponent)
-    for b in range(force.shape[0]):
-        for axis in range(2):
-            own = state[b, axis]
-            if signals.started[b] == 0.0:
-                own[5] = gains.alpha_start
-            z1, z2 = observe(
-                implicit,
-                signals.started[b],
-                signals.y[b, axis],
-                signals.u[b, axis],
-                signals.velocity[b, axis],
-                h,
-                k,
-                own,
-            )
-            acceleration = signals.acceleration[b, axis]
-            force[b, axis] = super_twisting_force(
-                z1, z2, acceleration, h, mass, gains, implicit, own
-            )
+    for b, axis in np.ndindex(force.shape):
+        own, started = state[b, axis], signals.started[b]
+        y, u = signals.y[b, axis], signals.u[b, axis]
+        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
+        if started == 0.0:
+            own[ALPHA] = gains.alpha_start
+        z1, z2 = observe(implicit, started, y, u, velocity, h, k, own)
+        force[b, axis] = super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, own)
 
 
 class SuperTwisting(ScriptedPolicy):
     """The paper's controller: adaptive super-twisting on a third-order sliding-mode observer."""
 
-    law_size = 6
-    positive = ("observer_gain",)
+    Gains = SuperTwistingGains
+    state = STATE
+    shown = ("rate", "disturbance", "integral", "alpha")
 
     def __init__(self, nominal: Nominal, implicit: bool = True, **gains: float) -> None:
-        """Take gains other than the paper's by name, see `SuperTwistingGains`."""
-        super().__init__(nominal, SuperTwistingGains(**gains))
+        """Take gains other than the paper's by name, and whether to discretise implicitly."""
+        super().__init__(nominal, **gains)
         check_exponent(self.gains.k2_exponent)
         require(
             self.gains.beta_offset + self.gains.epsilon > 0,
@@ -165,9 +176,7 @@ class SuperTwisting(ScriptedPolicy):
         )
         self._implicit = implicit
 
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         """The control (19)."""
-        force = np.empty_like(signals.y)
         model = self._model
-        super_twisting(signals, model.h, model.mass, self.gains, self._implicit, law_state, force)
-        return force
+        super_twisting(signals, model.h, model.mass, self.gains, self._implicit, state, force)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
 
 
 class Zero:
@@ -17,7 +18,7 @@ class Zero:
 
     def __init__(self, nominal: Nominal) -> None:
         """Take the number of thrusters."""
-        self._thrusters = len(nominal.robot.thrusters)
+        self._thrusters = world_of(nominal.robot).thrusters
 
     def predict(
         self,

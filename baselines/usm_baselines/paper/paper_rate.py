@@ -15,13 +15,13 @@ from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.plant.chain import kinematics
 from usm_gym.plant.layout import *
-from usm_gym.plant.motion import line_of_sight, path
 from usm_gym.plant.step import move_water, physics_step
-from usm_gym.plant.thrusters import allocate, allocation_matrix
+from usm_gym.plant.thrusters import allocate, allocation_matrix, saturated
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError
-from usm_gym.task.metrics import LOST_ERROR
+from usm_gym.task.guidance import *
+from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -102,18 +102,19 @@ def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None
         scenario: The scenario.
         law: The control law.
         every: Record every so many physics steps.
-        robot: The robot; without one, the paper's.
+        robot: The robot; without one, the scenario's.
 
     Raises:
         LostRobotError: If the robot is lost.
     """
     conditions = scenario.conditions
-    body = robot or Robot()
+    body = robot or scenario.body
     # Of this simulation only the start is used: it need not hold the noise of a whole episode.
-    simulation = Simulation(body, [replace(scenario, duration=conditions.control_period)])
+    start = replace(scenario, duration=conditions.control_period, robot=body)
+    simulation = Simulation([start])
     noise = scenario.noise() if conditions.position_noise else np.zeros((1, 2))
     record = record_for(scenario.steps * conditions.substeps // every, body.links)
-    blocks, plant = simulation.fleet.blocks, simulation.plant
+    blocks, plant = simulation.fleet.blocks, simulation.shared
     closed_loop(blocks, plant, body.total_mass, law, noise, every, record)
     if not np.abs(record.error).max() <= LOST_ERROR:
         period = conditions.control_period
@@ -150,7 +151,7 @@ def saturate(T, limit, commands, f_x, f_y):
     if beyond:
         f_x, f_y = 0.0, 0.0
         for j in range(commands.size):
-            commands[j] = min(max(commands[j], -limit), limit)
+            commands[j] = saturated(commands[j], limit)
             f_x += T[0, j] * commands[j]
             f_y += T[1, j] * commands[j]
     return f_x, f_y
@@ -170,8 +171,9 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
     cosine = row[row_of(COS, links) : row_of(COS, links) + links]
     theta = row[row_of(THETA, links) : row_of(THETA, links) + links]
     thrusters = plant.thruster_links.size
+    asked = row[body_rows(links, thrusters) :]
     commands = row[first_command(links) : first_command(links) + thrusters]
-    T = np.empty((3, thrusters))
+    T, wrench, work = np.empty((3, thrusters)), np.empty(3), np.empty((7, 3))
     sta = law.reading == SUPER_TWISTING
     gains = law.super_twisting
     k_sta = observer_gains(gains.observer_gain, gains.k2_exponent)
@@ -185,7 +187,9 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
     f_x, f_y = 0.0, 0.0
     for step in range(record.time.size * every):
         t = step * h
-        p_x, p_y, v_x, v_y, a_x, a_y = path(t, row[SPEED], row[SWAY], row[FREQUENCY], row[RAMP])
+        p_x, p_y, v_x, v_y, a_x, a_y = path(
+            t, asked[SPEED], asked[SWAY], asked[FREQUENCY], asked[RAMP]
+        )
         e_x, e_y = row[P_X] - p_x, row[P_Y] - p_y
         if plant.moving_water:
             move_water(block, 0.0, h)
@@ -225,13 +229,14 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
             heading = 0.0
             for i in range(links):
                 heading += theta[i]
-            heading = heading / links if row[HEAD_HEADING] == 0.0 else theta[links - 1]
-            distance = row[P_Y] + noise_y - (p_y if row[CROSS_TRACK] > 0.0 else 0.0)
-            moment = -heading_gain * (heading - line_of_sight(distance, row[LOOK_AHEAD]))
+            heading = heading / links if asked[HEAD_HEADING] == 0.0 else theta[links - 1]
+            distance = row[P_Y] + noise_y - (p_y if asked[CROSS_TRACK] > 0.0 else 0.0)
+            wrench[0], wrench[1] = f_x, f_y
+            wrench[2] = -heading_gain * (heading - line_of_sight(distance, asked[LOOK_AHEAD]))
             allocation_matrix(
                 sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T
             )
-            allocate(T, f_x, f_y, moment, commands)
+            allocate(T, wrench, 3, work, commands)
             f_x, f_y = saturate(T, row[LIMIT], commands, f_x, f_y)
         if step % every == 0:
             n = step // every

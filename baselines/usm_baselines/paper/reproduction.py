@@ -14,20 +14,24 @@ from typing import ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_baselines.benchmark.results import AnyScenario
 from usm_baselines.laws.pd import FORCE, MASS, OBSERVER, PDGains
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.paper.paper_rate import Law, Record, simulate
-from usm_gym.evaluation import AXES
+from usm_gym.robot import Robot
 from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.validation import Number, require, validated
 from usm_gym.task.metrics import max_error, settled_error
-from usm_gym.task.scenario import MODES, Mode, Scenario, named
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import MODES, Mode, Scenario
+from usm_gym.task.stored_scenario import StoredScenario
+from usm_gym.world import world_of
 
 A = TypeVar("A")
 K = TypeVar("K")
 R = TypeVar("R")
 
+# The axes of the paper's robot.
+AXES = world_of(Robot()).axes
 STEP = 1e-5
 IMPLICIT_STEP = 5e-4
 # The largest thruster limit that conditions may have, N; no run of the table comes near it.
@@ -85,7 +89,7 @@ class Declaration(Part):
     """
 
     beside: ClassVar[str] = "scenarios"
-    scenarios: Mapping[str, AnyScenario]
+    scenarios: Mapping[str, StoredScenario]
     heading_gain: Number
     sigma_start: tuple[Number, ...]
     implicit_step: Number

@@ -11,11 +11,10 @@ import numpy as np
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.paper.convergence import Start, cascade, disturbance_rate, growth
 from usm_baselines.paper.paper_rate import Array, Law, Record, simulate
-from usm_baselines.paper.reproduction import IMPLICIT_STEP, SAMPLE_TIME, at_step
-from usm_gym.evaluation import AXES
+from usm_baselines.paper.reproduction import AXES, IMPLICIT_STEP, SAMPLE_TIME, at_step
 from usm_gym.robot import Robot
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 Records = dict[tuple[str, Any], Record]
 

@@ -35,8 +35,9 @@ from usm_baselines.paper.reproduction import (
 from usm_gym.support.files import read_json
 from usm_gym.support.results import Interval, Provenance, Result
 from usm_gym.support.validation import Number, UsageError, in_one_line, validated
-from usm_gym.task.metrics import LOST_ERROR
-from usm_gym.task.scenario import Mode, Scenario, named
+from usm_gym.task.loss import LOST_ERROR
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import Mode, Scenario
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import TypeAdapter
 
-from usm_baselines.benchmark.results import AnyScenario
 from usm_baselines.laws.pd import FORCE, MASS, OBSERVER
 from usm_baselines.paper.paper_rate import Law, LostRobotError, simulate
 from usm_baselines.paper.reproduction import (
@@ -28,7 +27,9 @@ from usm_baselines.paper.reproduction import (
 from usm_gym.robot import Robot
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.validation import Number, Switch, UsageError, in_one_line, validated
-from usm_gym.task.scenario import MODES, Mode, named
+from usm_gym.task.sampling import named
+from usm_gym.task.scenario import MODES, Mode
+from usm_gym.task.stored_scenario import StoredScenario, as_json
 
 ROWS = ("sta", "pd")
 # Starts of the sliding variable in both axes, m/s, for the study of the oscillation that remains.
@@ -144,7 +145,7 @@ class TrialResult:
     value: str
     row: str
     mode: str
-    scenario: AnyScenario
+    scenario: StoredScenario
     law: LawRecord
     result: Outcome | None
 
@@ -152,7 +153,7 @@ class TrialResult:
     def key(self) -> str:
         """What the outcome depends on: equal keys, equal outcomes."""
         law = TypeAdapter(LawRecord).dump_python(self.law, mode="json")
-        return json.dumps([self.scenario.to_dict(), law], sort_keys=True)
+        return json.dumps([as_json(self.scenario), law], sort_keys=True)
 
 
 @validated

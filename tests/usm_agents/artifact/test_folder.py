@@ -24,12 +24,10 @@ from usm_agents.residual.task import Residual, ResidualPolicy
 
 import usm_gym
 from usm_cli.program import main
-from usm_gym.robot import Robot
 from usm_gym.support.validation import SAID
-from usm_gym.task.nominal import nominal_of
 
 SUITE = usm_gym.suite("operation")[:2]
-NOMINAL = nominal_of(Robot(), SUITE[0])
+NOMINAL = SUITE[0].nominal
 
 
 def network(inputs, outputs=3):

@@ -9,11 +9,8 @@ import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
 
 import usm_gym
-from usm_gym.robot import Robot
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.metrics import total_error
-from usm_gym.task.nominal import nominal_of
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
@@ -23,24 +20,24 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
     assert folder.name in usm_baselines.ids()
     agent, _ = read_agent(folder)
     scenarios = unseen(agent.mode, Conditions(**agent.conditions), seed=11, episodes=16)
-    nominal = nominal_of(Robot(), scenarios[0])
+    nominal = scenarios[0].nominal
     ours, base = (
         usm_gym.evaluate(usm_baselines.make(id, nominal), scenarios)
         for id in (folder.name, agent.base)
     )
     assert not ours.failed.any()
-    assert total_error(ours.per_episode).mean() < total_error(base.per_episode).mean()
+    assert ours.total_error.mean() < base.total_error.mean()
     for axis in "xy":
         name = f"max_error_{axis}"
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]
 
 
+@pytest.mark.slow
 def test_scoring_a_shipped_agent_does_not_import_torch():
     code = """
 import sys, usm_agents, usm_baselines, usm_gym
-from usm_gym.task.nominal import nominal_of
 suite = usm_gym.suite("operation")[:1]
-usm_gym.evaluate(usm_baselines.make("residual-ppo", nominal_of(usm_gym.Robot(), suite[0])), suite)
+usm_gym.evaluate(usm_baselines.make("residual-ppo", suite[0].nominal), suite)
 sys.exit("torch" in sys.modules)
 """
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,49 +1,51 @@
-"""Training: goes on after an interruption to the bit, says when it diverges, leaves an agent."""
+"""Training: goes on after an interruption, bit for bit, says when it diverges, leaves an agent."""
 
 import pickle
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
-import gymnasium as gym
 import numpy as np
 import pytest
-import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from usm_agents.artifact.folder import make_agent
-from usm_agents.learning import algorithms, training
-from usm_agents.learning.checkpoint import CURVE, MODEL, REPLAY, STATE, latest_checkpoint
+from usm_agents.learning import training
+from usm_agents.learning.checkpoint import CURVE, PROGRESS, latest_checkpoint
+from usm_agents.learning.divergence import DivergedError
 from usm_agents.learning.plan import PLAN as PLAN_FILE
 from usm_agents.learning.plan import Plan
-from usm_agents.learning.sb3_vec_env import SB3VecEnv
-from usm_agents.learning.training import DivergedError, train
+from usm_agents.learning.sb3 import learner
+from usm_agents.learning.sb3.learner import MODEL, REPLAY, STATES
+from usm_agents.learning.sb3.models import CLASSES, make_model
+from usm_agents.learning.settings import SETTINGS
 
 import usm_gym
 from usm_cli.program import main
-from usm_gym.robot import Robot
 from usm_gym.support.files import holding
-from usm_gym.task.nominal import nominal_of
 
 PLAN = Plan(steps=4096, interval=1024)
-SILENT = lambda steps, line: None  # noqa: E731
+train = partial(training.train, validation_episodes=2, test_episodes=2)
+
+
+def silent(steps, line):
+    pass
 
 
 @pytest.fixture(autouse=True)
-def small(monkeypatch):
-    monkeypatch.setattr(training, "ROBOTS", dict.fromkeys(algorithms.CLASSES, 4) | {"ppo": 16})
-    monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
-    monkeypatch.setattr(training, "TEST_EPISODES", 2)
+def few_robots(monkeypatch):
+    for algorithm, settings in SETTINGS.items():
+        monkeypatch.setitem(settings, "robots", 16 if algorithm == "ppo" else 4)
 
 
 def errors(curve):
-    return [(point["steps"], point["max_error_x"], point["max_error_y"]) for point in curve]
+    return [(each["steps"], each["max_error_x"], each["max_error_y"]) for each in curve]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["ppo", "recurrent-ppo"])
-def test_a_training_that_is_stopped_goes_on_to_the_bit(algorithm, tmp_path):
-    robots = training.ROBOTS[algorithm]
+def test_a_training_that_is_stopped_goes_on_bit_for_bit(algorithm, tmp_path):
+    robots = SETTINGS[algorithm]["robots"]
     plan = Plan(algorithm=algorithm, steps=256 * robots, interval=64 * robots)
-    whole = train(plan, tmp_path / "whole", SILENT)
+    whole = train(plan, tmp_path / "whole", silent)
 
     def stop(steps, line):
         if steps >= plan.steps // 2:
@@ -51,15 +53,15 @@ def test_a_training_that_is_stopped_goes_on_to_the_bit(algorithm, tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         train(plan, tmp_path / "stopped", stop)
-    assert errors(train(plan, tmp_path / "stopped", SILENT, resume=True)) == errors(whole)
+    assert errors(train(plan, tmp_path / "stopped", silent, resume=True)) == errors(whole)
     models = [
-        algorithms.CLASSES[algorithm].load(latest_checkpoint(folder) / MODEL, device="cpu")
+        CLASSES[algorithm].load(latest_checkpoint(folder) / MODEL, device="cpu")
         for folder in (tmp_path / "whole", tmp_path / "stopped")
     ]
     for ours, theirs in zip(*(model.policy.parameters() for model in models), strict=True):
         assert (ours == theirs).all()
     scenarios = usm_gym.suite("operation")[:1]
-    policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path / "stopped"))
+    policy = make_agent(scenarios[0].nominal, str(tmp_path / "stopped"))
     assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 
@@ -76,7 +78,7 @@ class Bomb:
 def armed(folder, name="checkpoint-0000000000"):
     """Put a checkpoint that is code into a folder; the file that its code makes."""
     (folder / name).mkdir(parents=True)
-    for file in (STATE, MODEL, REPLAY):
+    for file in (PROGRESS, MODEL, REPLAY, STATES):
         (folder / name / file).write_bytes(pickle.dumps(Bomb(folder / "was run")))
     return folder / "was run"
 
@@ -115,21 +117,21 @@ def test_a_checkpoint_without_a_plan_is_not_resumed(tmp_path, capsys):
 
 def test_a_finished_training_that_is_resumed_leaves_the_same_files(tmp_path):
     plan = Plan(steps=1024, interval=1024)
-    curve = train(plan, tmp_path, SILENT)
+    curve = train(plan, tmp_path, silent)
     before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
-    assert train(plan, tmp_path, SILENT, resume=True) == curve
+    assert train(plan, tmp_path, silent, resume=True) == curve
     assert before == {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
 
 
-@pytest.mark.parametrize("file", [STATE, MODEL])
+@pytest.mark.parametrize("file", [PROGRESS, MODEL, STATES])
 def test_a_checkpoint_that_cannot_be_read_gets_one_line(file, tmp_path):
     plan = Plan(steps=1024, interval=1024)
-    train(plan, tmp_path, SILENT)
+    train(plan, tmp_path, silent)
     damaged = latest_checkpoint(tmp_path) / file
     for data in (damaged.read_bytes()[:1000], pickle.dumps({"curve": []})):
         damaged.write_bytes(data)
         with pytest.raises(ValueError, match="is damaged, or of another version") as caught:
-            train(plan, tmp_path, SILENT, resume=True)
+            train(plan, tmp_path, silent, resume=True)
         assert "\n" not in str(caught.value)
 
 
@@ -140,74 +142,38 @@ def test_two_trainings_in_one_folder_are_one_and_one_line(tmp_path, capsys):
 
 
 def test_the_log_has_the_metric_on_held_out_scenarios(tmp_path):
-    curve = train(PLAN, tmp_path, SILENT)
+    curve = train(PLAN, tmp_path, silent)
     log = EventAccumulator(str(tmp_path)).Reload()
     logged = [(each.step, each.value) for each in log.Scalars("validation/max_error_x")]
     assert logged == [(each["steps"], np.float32(each["max_error_x"])) for each in curve]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
 def test_the_others_train_resume_and_leave_an_agent(algorithm, tmp_path, monkeypatch):
-    settings = algorithms.SETTINGS[algorithm]
+    settings = SETTINGS[algorithm]
     monkeypatch.setitem(settings, "learning_starts", 100)
     monkeypatch.setitem(settings, "buffer_size", 1000)
-    train(Plan(algorithm=algorithm, steps=200, interval=100), tmp_path, SILENT)
+    train(Plan(algorithm=algorithm, steps=200, interval=100), tmp_path, silent)
     longer = Plan(algorithm=algorithm, steps=300, interval=100)
-    curve = train(longer, tmp_path, SILENT, resume=True)
-    assert [point["steps"] for point in curve] == [0, 100, 200, 300]
+    curve = train(longer, tmp_path, silent, resume=True)
+    assert [each["steps"] for each in curve] == [0, 100, 200, 300]
     scenarios = usm_gym.suite("operation")[:1]
-    policy = make_agent(nominal_of(Robot(), scenarios[0]), str(tmp_path))
+    policy = make_agent(scenarios[0].nominal, str(tmp_path))
     assert not usm_gym.evaluate(policy, scenarios).failed.any()
 
 
-@pytest.mark.parametrize("algorithm", list(algorithms.CLASSES))
-def test_a_network_is_what_the_model_does(algorithm):
-    envs = gym.make_vec(
-        "usm_agents:USM-OperationResidual-v0",
-        num_envs=16,
-        vectorization_mode="vector_entry_point",
-        autoreset_mode="SameStep",
-    )
-    model = algorithms.make_model(algorithm, SB3VecEnv(envs))
-    with torch.no_grad():
-        for each in model.policy.parameters():
-            each.mul_(3.0)
-    random, network = np.random.default_rng(0), algorithms.network_of(algorithm, model)
-    their_state, our_state = None, None
-    for start in (np.ones(100, bool), np.zeros(100, bool), random.random(100) < 0.5):
-        seen = random.normal(size=(100, 44)).astype(np.float32)
-        expected, their_state = model.predict(seen, their_state, start, deterministic=True)
-        found, our_state = network.predict(seen, our_state, start)
-        np.testing.assert_allclose(found, expected, atol=1e-6)
-        assert np.abs(found).max() > 1e-4
-
-
 def test_a_diverging_training_is_stopped_with_a_clear_word(tmp_path, monkeypatch):
-    def wild(algorithm, env):
-        model = algorithms.make_model(algorithm, env)
+    def wild(*arguments):
+        model = make_model(*arguments)
         model.lr_schedule = lambda remaining: 1e30
         return model
 
-    monkeypatch.setattr(training, "make_model", wild)
+    monkeypatch.setattr(learner, "make_model", wild)
     with pytest.raises(
         DivergedError, match=r"diverged after \d+ steps: .*; the last checkpoint is"
     ):
-        train(PLAN, tmp_path, SILENT)
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"algorithm": "luck"}, "algorithm is 'luck'"),
-        ({"env": "CartPole-v1"}, "env is 'CartPole-v1'"),
-        ({"steps": 0}, "steps"),
-        ({"seed": -1}, "seed"),
-        ({"base": "os:system"}, "base is 'os:system'"),
-    ],
-)
-def test_bad_plans_are_refused(fields, message):
-    with pytest.raises(ValueError, match=message):
-        Plan(**fields)
+        train(PLAN, tmp_path, silent)
 
 
 @pytest.mark.parametrize(
@@ -219,11 +185,10 @@ def test_bad_plans_are_refused(fields, message):
         (["--conditions", "stormy"], "conditions is 'stormy'"),
     ],
 )
-def test_the_command_refuses_in_one_line(options, message, tmp_path):
-    code = "import sys; from usm_cli.program import main; main(sys.argv[1:])"
-    command = [sys.executable, "-c", code, "train", "--output", str(tmp_path / "new"), *options]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert answer.returncode == 2
-    assert answer.stderr.count("\n") == 1
-    assert message in answer.stderr
+def test_the_command_refuses_in_one_line(options, message, tmp_path, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["train", "--output", str(tmp_path / "new"), *options])
+    answer = capsys.readouterr().err
+    assert answer.count("\n") == 1
+    assert message in answer
     assert not (tmp_path / "new").exists()

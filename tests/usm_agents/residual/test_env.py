@@ -1,33 +1,19 @@
 """The residual task: its base to the bit, saturation once, single as vector, and what is seen."""
 
-import dataclasses
-import subprocess
-import sys
 import warnings
 
 import gymnasium as gym
 import numpy as np
 import pytest
-import usm_agents
 import usm_baselines
 from support import laws
 from usm_agents.residual.env import make_residual_vector_env
-from usm_agents.residual.task import Residual, ResidualPolicy
 
-import usm_gym
 from usm_gym.robot import Robot
-from usm_gym.task.nominal import nominal_of
 
 ID = "usm_agents:USM-OperationResidual-v0"
 TORPEDO = "usm_agents:USM-TorpedoResidual-v0"
 HARD = {"thruster_limit": 3.0, "current_limit": 0.3}
-
-
-class Still:
-    """An agent that corrects nothing."""
-
-    def predict(self, observation, state=None, episode_start=None, deterministic=True):
-        return np.zeros((len(observation), 3), np.float32), state
 
 
 def vector(count, **arguments):
@@ -79,39 +65,6 @@ def test_a_zero_residual_is_the_base_to_the_bit_in_a_vector():
         assert (its_rewards == rewards).all()
         assert (its_terminated == terminated).all()
     assert ends >= 3
-
-
-def test_a_zero_residual_scores_as_the_base():
-    scenarios = usm_gym.suite("operation")[:3]
-    nominal = nominal_of(Robot(), scenarios[0])
-    ours = usm_gym.evaluate(ResidualPolicy(Residual(nominal), Still()), scenarios)
-    base = usm_gym.evaluate(usm_baselines.make("sta", nominal), scenarios)
-    for name, values in base.per_episode.items():
-        assert (ours.per_episode[name] == values).all()
-
-
-def test_a_model_of_the_task_is_scored_with_its_base():
-    stable_baselines3 = pytest.importorskip("stable_baselines3")
-    env = gym.make(ID)
-    model = stable_baselines3.PPO("MlpPolicy", env, seed=0, device="cpu")
-    scenario = dataclasses.replace(usm_gym.suite("operation")[0], duration=1.0, settle_time=0.2)
-    seen, info = env.reset(options={"scenario": scenario})
-    truncated = False
-    while not truncated:
-        action, _ = model.predict(seen, deterministic=True)
-        seen, _, _, truncated, info = env.step(action)
-    for task in (env, vector(2), vector(2).residual):
-        scores = usm_gym.evaluate(usm_agents.ResidualPolicy(task, model), [scenario] * 2)
-        for axis in "xy":
-            expected = [info[f"max_error_{axis}"]] * 2
-            # The network's last bits depend on how many robots it acts for.
-            np.testing.assert_allclose(scores.per_episode[f"max_error_{axis}"], expected, rtol=1e-3)
-    with pytest.raises(
-        ValueError, match=r"is \(44,\); allowed: \(90,\); .* usm_agents.ResidualPolicy"
-    ):
-        usm_gym.evaluate(model, [scenario])
-    with pytest.raises(ValueError, match="allowed: an environment of the residual task"):
-        usm_agents.ResidualPolicy(env.unwrapped, model)
 
 
 @pytest.mark.parametrize("autoreset_mode", ["NextStep", "SameStep"])
@@ -301,8 +254,3 @@ def test_torpedo_mode():
     seen, _ = envs.reset(seed=0)
     assert envs.unwrapped.mode == "torpedo"
     assert envs.observation_space.contains(seen)
-
-
-def test_importing_agents_does_not_import_torch():
-    code = "import sys, agents, usm_cli.program; sys.exit('torch' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

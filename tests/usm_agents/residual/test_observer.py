@@ -5,14 +5,13 @@ import sys
 import gymnasium as gym
 import numpy as np
 import pytest
-from usm_agents.residual.observation import BASE_STATES
+from usm_agents.residual.observation import BASE_ENTRIES, base_entries
 from usm_agents.residual.task import Residual
 from usm_baselines.estimation.estimator import Estimator
 
 from usm_gym.robot import Robot, Thruster
-from usm_gym.task.nominal import nominal_of
 from usm_gym.task.observation import ObservationLayout
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 ID = "usm_agents:USM-OperationResidual-v0"
 SMALL = Robot(
@@ -61,17 +60,15 @@ def expected(residual, memory, observation, estimator_state, start, last):
         "reference_deflection_acceleration": summed(value["joint_reference_accelerations"]),
         "bending_joints": summed((value["joint_references"] != 0.0).astype(float)),
     }
-    shown = BASE_STATES.get(type(residual.base), {})
-    if shown:
-        law = residual.base.law_state(memory.base_state)
-        law = law[:, :6].reshape(-1, 2, 3) if law.ndim == 2 else law
-    return numbers | {entry.name: law[:, :, index] for index, entry in shown.items()}
+    for name in getattr(residual.base, "shown", ()):
+        numbers[BASE_ENTRIES[name].name] = residual.base.state_of(memory.base_state)[name]
+    return numbers
 
 
 @pytest.mark.parametrize("robot", [Robot(), SMALL, LONG], ids=["paper", "small", "long"])
 @pytest.mark.parametrize("base", ["sta", "lqg-joints", "zero"])
 def test_every_entry_of_the_table_is_filled_in_to_the_bit(base, robot):
-    nominal = nominal_of(robot, named("nominal", "operation"))
+    nominal = named("nominal", "operation").nominal
     residual = Residual(nominal, base, omit=("heading",), frames=2)
     layout = residual.layout
     plain = ObservationLayout(robot.links, len(robot.thrusters))
@@ -97,6 +94,11 @@ def test_every_entry_of_the_table_is_filled_in_to_the_bit(base, robot):
         last = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
         _, memory = residual.command(memory, last)
         start = rng.random(3) < 0.2
+
+
+def test_a_base_may_not_show_what_has_no_entry():
+    with pytest.raises(ValueError, match="shown is 'mood'; allowed: rate, disturbance"):
+        base_entries(["rate", "mood"])
 
 
 def calls(step, *arguments):

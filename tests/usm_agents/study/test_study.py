@@ -3,13 +3,15 @@
 import json
 import pickle
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from usm_agents.artifact.folder import read_agent
-from usm_agents.learning import training
 from usm_agents.learning.plan import Plan, write_plan
+from usm_agents.learning.settings import SETTINGS
+from usm_agents.learning.training import train
 from usm_agents.study import dissection, plans, scores, trainings
 from usm_agents.study.dissection import lateness
 from usm_agents.study.plans import PLANS, SEEDS, TRANSFER
@@ -24,14 +26,15 @@ from usm_gym.task.conditions import FIELD
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    monkeypatch.setattr(training, "ROBOTS", {"ppo": 16})
-    monkeypatch.setattr(training, "VALIDATION_EPISODES", 2)
-    monkeypatch.setattr(training, "TEST_EPISODES", 2)
+    monkeypatch.setitem(SETTINGS["ppo"], "robots", 16)
+    small_train = partial(train, validation_episodes=2, test_episodes=2)
+    monkeypatch.setattr(trainings, "train", small_train)
     monkeypatch.setattr(plans, "RIVALS", ("sta", "zero"))
     monkeypatch.setattr(scores, "TRANSFER", {"still": TRANSFER["still"]})
     monkeypatch.setattr(dissection, "EPISODES", 1)
 
 
+@pytest.mark.slow
 def test_a_small_study_end_to_end(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "study"
     command = ["study", "residual", "--only", "residual-ppo,reference", "--seeds", "1"]

@@ -227,6 +227,7 @@ def whole_files(folder: Path) -> list[Path]:
     return [file for file in folder.glob("*.json") if ".part" not in file.name]
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     tests = str(Path(__file__).parents[2])
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([tests, *sys.path])}

@@ -15,6 +15,7 @@ pytest.importorskip("optuna", reason="the extra `tune` is not installed")
 
 import optuna
 import sqlalchemy
+from support.episodes import METRICS
 from usm_baselines import registry
 from usm_baselines.benchmark import tuning
 from usm_baselines.benchmark.tuning import Problem, objective, tune
@@ -22,7 +23,7 @@ from usm_baselines.gains import Budget
 from usm_baselines.space import Range
 
 from usm_gym import suites
-from usm_gym.evaluation import METRICS, Evaluation
+from usm_gym.evaluation import Evaluation
 from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.scenario import STILL
@@ -166,6 +167,7 @@ def test_a_storage_that_cannot_be_used_gets_one_line() -> None:
         tune(problem(), "nonsense")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "number"),
     [("ask", 3), ("set_user_attr", 0), ("set_user_attr", 5), *(("tell", n) for n in (0, 3, 7, 19))],

@@ -4,18 +4,15 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import pytest
 import usm_baselines
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.prediction import Predictor
-from usm_baselines.laws.mpc import forced_response, receding_gain
 from usm_baselines.signals import Signals, model_of
 
 from usm_gym import Robot, Scenario, evaluate
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.nominal import nominal_of
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 ROBOT = Robot()
 # Nothing unknown but the start: nominal water at rest, no noise, thrusters with their lag.
@@ -44,11 +41,11 @@ def signals(simulation: Simulation, started: bool) -> Signals:
 
 def test_the_nominal_plant_is_foreseen() -> None:
     """Commands that are held, joints in full motion: where it goes and where it is said to go."""
-    nominal = nominal_of(ROBOT, scenario())
+    nominal = scenario().nominal
     correction = kalman.linear_model(nominal, 1e-2, 0.1).correction
     predictor = Predictor(nominal, model_of(nominal), correction)
     state = np.zeros((1, predictor.size))
-    simulation = Simulation(ROBOT, [scenario()])
+    simulation = Simulation([scenario()])
     rng = np.random.default_rng(0)
     action = np.zeros((1, 5), np.float32)
     for k in range(86):
@@ -69,28 +66,9 @@ def test_the_nominal_plant_is_foreseen() -> None:
     assert np.abs(moved).max() > 1e-4
 
 
-def test_the_forced_response_is_the_model_stepped() -> None:
-    T = kalman.sampled(0.4, 0.05, 0.02)
-    changes = np.random.default_rng(0).normal(size=6)
-    x, u, errors = np.zeros(4), 0.0, []
-    for change in changes:
-        u += change
-        x = T @ [*x, u, 0.0]
-        errors.append(x[0])
-    np.testing.assert_allclose(forced_response(T, 6) @ changes, errors, rtol=1e-12)
-
-
-def test_the_first_change_is_that_of_the_least_squares() -> None:
-    T = kalman.sampled(0.4, 0.05, 0.02)
-    free, weight = np.random.default_rng(1).normal(size=8), 1e-3
-    S = np.vstack([forced_response(T, 8), weight * np.eye(8)])
-    best, *_ = np.linalg.lstsq(S, np.append(-free, np.zeros(8)), rcond=None)
-    assert -receding_gain(T, 8, weight) @ free == pytest.approx(best[0], rel=1e-6)
-
-
 def test_joint_motion_that_is_foreseen_disturbs_little() -> None:
     """Noise of the laws' filters as in field, so that their gains are the same."""
-    nominal = dataclasses.replace(nominal_of(ROBOT, scenario()), position_noise=5e-5)
+    nominal = dataclasses.replace(scenario().nominal, position_noise=5e-5)
     worst = {}
     for id in ("lqg", "lqg-joints", "mpc"):
         gains = {"disturbance_noise": 0.1, "variation_weight": 5e-5}

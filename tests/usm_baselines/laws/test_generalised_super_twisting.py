@@ -93,6 +93,6 @@ def test_constant_gains_are_adaptive_ones_that_keep_still() -> None:
     state = None
     for _ in range(5):
         _, state = growing.predict(observation, state)
-    alpha = growing.law_state(state)[..., 5]
+    alpha = growing.state_of(state)["alpha"]
     grown = growing.gains.alpha_start + 5 * 0.02 * growing.gains.omega / np.sqrt(2.0)
     np.testing.assert_allclose(alpha, grown)

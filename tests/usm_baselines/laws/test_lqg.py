@@ -47,7 +47,7 @@ def test_no_other_gain_costs_less(damping: float) -> None:
 def test_a_constant_disturbance_is_found_and_held_off() -> None:
     policy = LQG(NOMINAL, disturbance_noise=0.5)
     linear, mass = policy._linear, NOMINAL.robot.total_mass
-    x, law, u = np.zeros((2, 4)), np.zeros((1, 2, 4)), np.zeros(2)
+    x, law, force, u = np.zeros((2, 4)), np.zeros((1, 2, 4)), np.empty((1, 2)), np.zeros(2)
     x[:, 0], x[:, 2] = 0.02, [0.6, -0.3]
     acceleration, velocity = np.array([[0.05, -0.02]]), np.array([[0.1, 0.03]])
     for k in range(800):
@@ -60,7 +60,8 @@ def test_a_constant_disturbance_is_found_and_held_off() -> None:
             allocation=np.zeros((1, 3, 5)),
             observation=np.zeros((1, 90), np.float32),
         )
-        u = policy.force(signals, law)[0] / linear.inertia
+        policy.control(signals, law, force)
+        u = force[0] / linear.inertia
         w = -acceleration[0] - linear.damping * velocity[0]
         x = np.stack([T @ [*x[i], u[i], w[i]] for i, T in enumerate(linear.transition)])
     np.testing.assert_allclose(law[0], x, atol=1e-6)

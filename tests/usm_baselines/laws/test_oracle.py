@@ -11,8 +11,7 @@ from usm_cli.selection import chosen_contenders
 from usm_gym import Robot, evaluate
 from usm_gym.support.seeding import TUNING, stream
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.nominal import nominal_of
-from usm_gym.task.scenario import sample
+from usm_gym.task.sampling import sample
 
 ROBOT = Robot()
 
@@ -25,14 +24,14 @@ def scenarios(conditions: str, count: int) -> list[Any]:
 @pytest.mark.parametrize("conditions", ["ideal", "field"])
 def test_leaves_hundredths_of_a_millimetre(conditions: str) -> None:
     episodes = scenarios(conditions, 8)
-    scores = evaluate(usm_baselines.make("oracle", nominal_of(ROBOT, episodes[0])), episodes)
+    scores = evaluate(usm_baselines.make("oracle", episodes[0].nominal), episodes)
     for axis in "xy":
         assert scores.per_episode[f"max_error_{axis}"].mean() < 5e-5
 
 
 def test_alone_and_side_by_side_the_bits_are_the_same() -> None:
     episodes = [dataclasses.replace(each, duration=6.0) for each in scenarios("field", 3)]
-    policy = usm_baselines.make("oracle", nominal_of(ROBOT, episodes[0]))
+    policy = usm_baselines.make("oracle", episodes[0].nominal)
     together = evaluate(policy, episodes).per_episode
     for i, episode in enumerate(episodes):
         alone = evaluate(policy, [episode]).per_episode
@@ -42,7 +41,7 @@ def test_alone_and_side_by_side_the_bits_are_the_same() -> None:
 def test_is_no_competitor_and_wants_the_truth() -> None:
     episodes = scenarios("field", 1)
     assert "oracle" not in [each.name for each in chosen_contenders(None)]
-    policy: Any = usm_baselines.make("oracle", nominal_of(ROBOT, episodes[0]))
+    policy: Any = usm_baselines.make("oracle", episodes[0].nominal)
     assert policy.privileged
     with pytest.raises(ValueError, match="snapshot is None; allowed: the true state"):
         policy.predict(np.zeros((1, 90), np.float32))

@@ -15,7 +15,7 @@ from usm_baselines.laws.pd import FORCE, MASS, OBSERVER, PDGains
 import usm_gym
 from usm_gym import Robot
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named
+from usm_gym.task.sampling import named
 
 Array = NDArray[np.float64]
 

@@ -36,8 +36,8 @@ def test_a_double_integrator_is_brought_to_rest_under_a_constant_push() -> None:
         a = float(action[0]) * limit / mass + 0.5
         observation[83:88] = np.clip(action, -1.0, 1.0)
         x, v = x + h * v + 0.5 * h * h * a, v + h * a
-        p1, p2, *_, integral = policy.law_state(state)[0, 0]
-        surfaces.append(p2 + 6.0 * p1 + 9.0 * integral)
+        kept = {name: numbers[0, 0] for name, numbers in policy.state_of(state).items()}
+        surfaces.append(kept["rate"] + 6.0 * kept["error"] + 9.0 * kept["integral"])
     assert surfaces[0] == 0.0
     # The push of 0.5 m/s^2 bends s by 0.5 / 2 of the layer.
     assert np.abs(surfaces).max() < 0.1

@@ -17,7 +17,7 @@ from usm_baselines.paper.reproduction import at_step
 
 from usm_gym.support.seeding import TUNING, stream
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named, sample
+from usm_gym.task.sampling import named, sample
 
 PAPER = SuperTwistingGains()
 L = PAPER.observer_gain

@@ -9,12 +9,12 @@ import usm_baselines
 from numpy.typing import NDArray
 
 import usm_gym
-from usm_gym import Conditions, Robot, Scenario
+from usm_gym import Conditions, Scenario
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.nominal import nominal_of
-from usm_gym.task.scenario import Mode, named, sample
+from usm_gym.task.sampling import named, sample
+from usm_gym.task.scenario import Mode
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ IDEAL = PRESETS["ideal"]
 
 
 def score(id: str, scenarios: list[Scenario], **gains: float) -> Evaluation:
-    nominal = nominal_of(Robot(), scenarios[0])
+    nominal = scenarios[0].nominal
     return usm_gym.evaluate(usm_baselines.make(id, nominal, **gains), scenarios)
 
 

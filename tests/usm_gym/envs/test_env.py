@@ -78,7 +78,7 @@ def test_observation_is_what_the_table_says():
     layout = env.unwrapped.layout
     seen = {name: (observation * layout.scale)[part] for name, part in layout.slices.items()}
     simulation = env.unwrapped.simulation
-    theta = simulation.theta[0]
+    theta = simulation.read("theta")[0]
     path = env.unwrapped.scenario.path
     s = 14.0 - path.ramp / 2
     phase = path.frequency * s
@@ -86,7 +86,7 @@ def test_observation_is_what_the_table_says():
     velocity = [path.speed, slope * np.cos(phase)]
     acceleration = [0.0, -slope * path.frequency * np.sin(phase)]
     reference = np.array([path.speed * s, path.amplitude * np.sin(phase)])
-    error = simulation.position[0] - reference
+    error = simulation.read("position")[0] - reference
     close = {"rtol": 2e-7, "atol": 1e-9}
     np.testing.assert_allclose(seen["position_error"], error, **close)
     np.testing.assert_allclose([info["error_x"], info["error_y"]], error, atol=1e-15)

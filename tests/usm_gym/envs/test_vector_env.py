@@ -131,7 +131,7 @@ def test_bad_arguments_are_refused(arguments, message):
 
 
 def test_what_was_never_made_can_be_closed():
-    env = usm_gym.envs.vector_env.USMVectorEnv
+    env = usm_gym.envs.usm.USMVectorEnv
     env.__new__(env).close()
 
 

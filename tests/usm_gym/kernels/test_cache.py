@@ -18,7 +18,7 @@ POSITIONS = """
 import numpy as np
 import usm_baselines
 import usm_gym
-from usm_gym.plant.motion import path_positions
+from usm_gym.task.guidance import path_positions
 positions = np.empty((16, 2))
 path_positions(np.arange(16.0), 0.1, 0.2, 1.0, 2.0, positions)
 misses = sum(path_positions.stats.cache_misses.values())
@@ -29,15 +29,16 @@ import hashlib
 import numpy as np
 from usm_gym import Robot
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import sample
+from usm_gym.task.sampling import sample
 from usm_gym.simulation import Simulation
 draw = np.random.default_rng(0)
 for size in (1, 3):
     scenarios = [sample("operation", PRESETS["rough"], draw) for _ in range(size)]
-    fleet = Simulation(Robot(), scenarios)
+    fleet = Simulation(scenarios)
     for _ in range(100):
         fleet.step(draw.uniform(-1, 1, (size, 5)).astype(np.float32))
-    state = np.concatenate([fleet.observation.ravel(), fleet.error.ravel(), fleet.theta.ravel()])
+    state = [fleet.observation.ravel(), fleet.error.ravel(), fleet.read("theta").ravel()]
+    state = np.concatenate(state)
     print(hashlib.sha256(state.tobytes()).hexdigest())
 """
 
@@ -70,6 +71,7 @@ def edit(file, old, new):
     file.write_text(source.replace(old, new))
 
 
+@pytest.mark.slow
 def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(copy):
     folder, environment = copy
     cold = run(POSITIONS, **environment)
@@ -86,14 +88,12 @@ def test_a_warm_cache_is_used_and_an_edited_helper_is_not_served_stale(copy):
 
 LAWS = """
 import numpy as np
-from usm_baselines.estimation import observer
 from usm_baselines.laws.pd import PDGains, pd
 from usm_baselines.laws.pid import PIDGains, pid
-from usm_baselines.signals import room_for_signals
+from usm_baselines.signals import Signals
 
-signals = room_for_signals(np.zeros((1, 1), np.float32), 3)
-for value, signal in enumerate(signals[:5]):
-    signal[...] = 0.1 * (value + 1)
+values = (np.full((1, 2), 0.1 * (k + 1)) for k in range(4))
+signals = Signals(np.ones(1), *values, np.zeros((1, 3, 3)), np.zeros((1, 1), np.float32))
 for law, arguments in ((pd, (PDGains(), 0)), (pid, (PIDGains(),))):
     state, force = np.full((1, 2, 4), 0.01), np.empty((1, 2))
     law(signals, 0.02, 10.0, *arguments, state, force)
@@ -101,6 +101,7 @@ for law, arguments in ((pd, (PDGains(), 0)), (pid, (PIDGains(),))):
 """
 
 
+@pytest.mark.slow
 def test_an_edit_recompiles_the_kernels_that_use_it_and_no_others(copy):
     folder, environment = copy
     (cold_pd, force_pd), (cold_pid, force_pid) = map(str.split, run(LAWS, **environment))
@@ -124,6 +125,7 @@ print(sum(my_laws.law.force.stats.cache_misses.values()), force)
 """
 
 
+@pytest.mark.slow
 def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     sources = {
         "my_laws/__init__.py": "",
@@ -145,6 +147,7 @@ def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     assert run(OWN, **environment) == ["1 8.0"]
 
 
+@pytest.mark.slow
 def test_a_processor_without_vector_or_fused_instructions_computes_the_same_bits(tmp_path):
     generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": tmp_path}
     assert run(FLEET, **generic) == run(FLEET)
@@ -193,6 +196,7 @@ pwd.getpwuid, tempfile.gettempdir = nobody, nowhere
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="users without a home are of POSIX")
 @pytest.mark.parametrize("given", [True, False])
 def test_a_user_without_home_or_temporary_folder_needs_neither(given, tmp_path):
@@ -285,6 +289,7 @@ def compiled_once(tmp_path_factory):
     return folder, run(POSITIONS, NUMBA_CACHE_DIR=folder)[2:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("suffix", "damage"),
     [("nbi", "truncated"), ("nbi", "garbage"), ("nbc", "truncated"), ("nbc", "empty")],
@@ -292,7 +297,7 @@ def compiled_once(tmp_path_factory):
 def test_a_damaged_file_of_the_cache_is_named_and_replaced(suffix, damage, compiled_once, tmp_path):
     filled, numbers = compiled_once
     shutil.copytree(filled, tmp_path, dirs_exist_ok=True)
-    (damaged,) = tmp_path.rglob(f"motion.path_positions-*.{suffix}")
+    (damaged,) = tmp_path.rglob(f"guidance.path_positions-*.{suffix}")
     data = damaged.read_bytes()
     kept = {"truncated": data[: len(data) // 2], "empty": b"", "garbage": bytes(len(data))}
     damaged.write_bytes(kept[damage])

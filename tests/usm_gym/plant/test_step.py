@@ -16,11 +16,10 @@ import usm_gym
 from usm_gym import Conditions, Inspection, Robot, Scenario, Water
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import named, sample
+from usm_gym.task.sampling import named, sample
 
 Array = NDArray[np.float64]
 
-PAPER_ROBOT = Robot()
 IDEAL, ROUGH = PRESETS["ideal"], PRESETS["rough"]
 
 
@@ -49,10 +48,10 @@ def test_one_step_agrees_with_the_dense_oracle(
         hydrodynamics=hydrodynamics,
     )
     for _ in range(20):
-        scenario = sample("operation", conditions, rng, links - 1)
+        scenario = sample("operation", conditions, rng, robot)
         before = dense_step.random_moment(robot, rng, scenario.steps)
         action = rng.uniform(-1.5, 1.5, len(robot.thrusters)).astype(np.float32)
-        simulation = Simulation(robot, [scenario])
+        simulation = Simulation([scenario])
         dense_step.place(simulation, before)
         simulation.step(action[np.newaxis])
         command = ROUGH.thruster_limit * np.clip(action.astype(float), -1.0, 1.0)
@@ -68,7 +67,7 @@ def test_a_control_period_is_many_steps_under_one_command(integrator: str, step:
         sample("operation", conditions, np.random.default_rng(0)),
         inspection=Inspection(times=(60 * step, 150 * step), deflections=(1.2, -0.8)),
     )
-    simulation = Simulation(robot, [scenario])
+    simulation = Simulation([scenario])
     start = moment = dense_step.read(simulation)
     rng = np.random.default_rng(1)
     for _ in range(6):
@@ -84,7 +83,7 @@ def test_a_control_period_is_many_steps_under_one_command(integrator: str, step:
 def test_joints_may_have_gains_of_the_scenario() -> None:
     scenario = replace(named("table1", "operation"), joint_stiffness=900.0, joint_damping=15.0)
     scenario = replace(scenario, conditions=replace(IDEAL, control_period=IDEAL.physics_step))
-    simulation = Simulation(Robot(), [scenario])
+    simulation = Simulation([scenario])
     before = dense_step.random_moment(Robot(), np.random.default_rng(0), scenario.steps)
     dense_step.place(simulation, before)
     simulation.step(np.zeros((1, 5), np.float32))
@@ -107,10 +106,10 @@ THRUST = np.array([0.5, -0.4, 0.3, 0.6, -0.2], np.float32)  # over the limit, al
 def bend(step: float, integrator: str) -> Array:
     """Return angles (16) and position (2) after the smooth episode."""
     conditions = replace(BEND.conditions, physics_step=step, integrator=integrator)
-    simulation = Simulation(Robot(), [replace(BEND, conditions=conditions)])
+    simulation = Simulation([replace(BEND, conditions=conditions)])
     for _ in range(simulation.scenarios[0].steps):
         simulation.step(THRUST[np.newaxis])
-    return np.concatenate([simulation.theta[0], simulation.position[0]])
+    return np.concatenate([simulation.read("theta")[0], simulation.read("position")[0]])
 
 
 @cache
@@ -159,14 +158,14 @@ def test_robots_of_any_length_keep_still_and_stable(links: int) -> None:
     robot = swimmer(links)
     inspection = Inspection(bending_joints=1, times=(1.0, 3.0), deflections=(0.5, -0.5))
     scenario = Scenario(conditions=IDEAL, inspection=inspection, duration=6.0)
-    simulation = Simulation(robot, [scenario])
+    simulation = Simulation([scenario])
     for _ in range(scenario.steps):
         simulation.step(np.zeros((1, len(robot.thrusters)), np.float32))
-    theta = simulation.theta[0]
+    theta = simulation.read("theta")[0]
     # The joint nearest to the head bends, the head turning to minus the deflection.
     np.testing.assert_allclose(np.diff(theta)[:-1], 0.0, atol=0.05)
     assert theta[-1] - theta[-2] == pytest.approx(0.5, abs=0.05)
-    assert np.abs(simulation.position[0]).max() < 0.5 * robot.link_length * links
+    assert np.abs(simulation.read("position")[0]).max() < 0.5 * robot.link_length * links
 
 
 def references_of(simulation: Simulation) -> Array:
@@ -185,7 +184,7 @@ def test_joint_references_follow_the_critically_damped_filter(
     inspection = Inspection(
         bending_joints=4, times=(0.2, 0.5), deflections=(1.2, -0.8), filter_frequency=frequency
     )
-    simulation = Simulation(Robot(), [Scenario(conditions=conditions, inspection=inspection)])
+    simulation = Simulation([Scenario(conditions=conditions, inspection=inspection)])
     for k in range(1, 100):
         simulation.step(np.zeros((1, 5), np.float32))
         expected = np.zeros(3)
@@ -214,7 +213,7 @@ def test_joint_references_without_a_filter_are_steps() -> None:
     )
     scenario = Scenario(conditions=IDEAL, inspection=inspection)
     for copies in (1, 2):
-        simulation = Simulation(Robot(), [scenario] * copies)
+        simulation = Simulation([scenario] * copies)
         for k in range(1, 40):
             simulation.step(np.zeros((copies, 5), np.float32))
             deflection = 0.0 if k <= 10 else 1.2 if k <= 25 else -0.8
@@ -226,7 +225,7 @@ def test_joint_references_without_a_filter_are_steps() -> None:
 def test_still_joints_have_no_reference() -> None:
     conditions = replace(IDEAL, motion=False)
     scenario = replace(named("nominal", "operation", conditions), duration=12.0)
-    simulation = Simulation(Robot(), [scenario])
+    simulation = Simulation([scenario])
     for _ in range(scenario.steps):
         simulation.step(np.zeros((1, 5), np.float32))
         assert not references_of(simulation).any()
@@ -235,7 +234,7 @@ def test_still_joints_have_no_reference() -> None:
 @pytest.mark.parametrize("time_constant", [0.0, 0.05, 0.1])
 def test_thrusters_lag_exactly_behind_the_saturated_command(time_constant: float) -> None:
     conditions = replace(IDEAL, thruster_time_constant=time_constant, thruster_limit=20.0)
-    simulation = Simulation(Robot(), [Scenario(conditions=conditions)])
+    simulation = Simulation([Scenario(conditions=conditions)])
     rng = np.random.default_rng(0)
     force = np.zeros(5)
     kept = np.exp(-0.02 / time_constant) if time_constant else 0.0
@@ -246,7 +245,7 @@ def test_thrusters_lag_exactly_behind_the_saturated_command(time_constant: float
         simulation.step(action[np.newaxis])
         command = 20.0 * np.clip(action.astype(float), -1.0, 1.0)
         force = command + kept * (force - command)
-        np.testing.assert_array_equal(simulation.command[0], command)
+        np.testing.assert_array_equal(simulation.read("command")[0], command)
         np.testing.assert_allclose(dense_step.read(simulation).thrust, force, rtol=0, atol=1e-12)
     assert saturated
 
@@ -287,17 +286,17 @@ def actions() -> NDArray[np.float32]:
     return rng.normal(0.0, 0.6, (STEPS, 20, 5)).astype(np.float32)
 
 
-def run(scenarios: Sequence[Scenario], first: int = 0, robot: Robot = PAPER_ROBOT) -> list[Array]:
+def run(scenarios: Sequence[Scenario], first: int = 0) -> list[Array]:
     """Return all that can be seen of each robot, and its state at the end, (robots, numbers)."""
     size = len(scenarios)
-    simulation = Simulation(robot, scenarios)
+    simulation = Simulation(scenarios)
     seen = [simulation.observation.copy()]
-    for action in actions()[:, first : first + size, : len(robot.thrusters)]:
+    for action in actions()[:, first : first + size, : simulation.world.thrusters]:
         simulation.step(action)
         seen += [
             simulation.observation.copy(),
             simulation.error.copy(),
-            simulation.heading_error.copy()[:, np.newaxis],
+            simulation.attitude_error.copy(),
         ]
     moments = [dense_step.read(simulation, k) for k in range(size)]
     return [*seen, np.stack([np.hstack(moment) for moment in moments])]
@@ -325,14 +324,14 @@ def test_many_robots_have_the_bits_of_each_alone(size: int) -> None:
 def test_robots_of_any_length_have_the_bits_of_each_alone(links: int) -> None:
     robot = swimmer(links)
     rng = np.random.default_rng(links)
-    drawn = [sample("operation", ROUGH, rng, links - 1) for _ in range(3)]
+    drawn = [sample("operation", ROUGH, rng, robot) for _ in range(3)]
     times, sizes = (1.0, 3.0, 5.0), (0.4, -0.3, 0.1)
     scenarios = [
         replace(s, inspection=replace(s.inspection, times=times, deflections=sizes)) for s in drawn
     ]
-    together = run(scenarios, robot=robot)
+    together = run(scenarios)
     for k in range(3):
-        for many, one in zip(together, run(scenarios[k : k + 1], k, robot), strict=True):
+        for many, one in zip(together, run(scenarios[k : k + 1], k), strict=True):
             assert same(many[k], one[0])
 
 
@@ -340,7 +339,7 @@ def test_the_lane_does_not_matter() -> None:
     turned = run(mixture()[::-1][:9])
     # actions() are by place: give robot 19 - k those of place k.
     for k in range(9):
-        simulation = Simulation(Robot(), [mixture()[19 - k]])
+        simulation = Simulation([mixture()[19 - k]])
         for action in actions()[:, k : k + 1]:
             simulation.step(action)
         assert same(turned[-1][k], np.hstack(dense_step.read(simulation)))

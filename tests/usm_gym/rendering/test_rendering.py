@@ -32,11 +32,11 @@ def episode(steps, policy="sta", render_mode="rgb_array", scenario="nominal", **
     env = gym.make(ID, render_mode=render_mode, **arguments)
     observation, _ = env.reset(options={"scenario": scenario})
     controller, state = usm_baselines.make(policy, env), None
-    positions = [env.unwrapped.simulation.position[0]]
+    positions = [env.unwrapped.simulation.read("position")[0]]
     for _ in range(steps):
         action, state = controller.predict(observation, state)
         observation, *_ = env.step(action)
-        positions.append(env.unwrapped.simulation.position[0])
+        positions.append(env.unwrapped.simulation.read("position")[0])
     return env, np.array(positions)
 
 
@@ -52,7 +52,7 @@ def test_a_picture_is_the_simulations():
     simulation = env.unwrapped.simulation
     (recorder,) = env.unwrapped._viewer._recorders
     picture = recorder.picture(simulation)
-    theta = simulation.theta[0]
+    theta = simulation.read("theta")[0]
     assert picture.time == pytest.approx(11.2)
     np.testing.assert_allclose(picture.body.centres.mean(axis=0), positions[-1], atol=1e-12)
     ends = 0.07 * np.stack([np.cos(theta), np.sin(theta)], axis=1)
@@ -181,7 +181,7 @@ def test_a_window_shows_the_chosen_robot_of_a_vector(monkeypatch):
     assert (shown[-1] == single.render()).all()
     envs.close()
     with pytest.raises(ValueError, match="render_index is 3; allowed: 0 to 2"):
-        usm_gym.envs.vector_env.USMVectorEnv(3, "operation", render_index=3)
+        usm_gym.envs.usm.USMVectorEnv(3, "operation", render_index=3)
 
 
 def test_an_episode_after_another_starts_a_trail_of_its_own():
@@ -300,7 +300,7 @@ def test_a_copy_goes_on_as_the_original(make, copied, render_mode):
             np.testing.assert_equal(ours, theirs)
     np.testing.assert_equal(env.render(), other.render())
     first, second = (each.unwrapped.simulation for each in (env, other))
-    np.testing.assert_equal(first.theta, second.theta)
+    np.testing.assert_equal(first.read("theta"), second.read("theta"))
     np.testing.assert_equal(first.snapshot().arrays, second.snapshot().arrays)
     env.close()
     other.close()

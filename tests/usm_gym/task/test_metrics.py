@@ -114,7 +114,7 @@ def test_saturation_share_counts_commands_at_the_limit_of_either_sign() -> None:
     [
         (TIME, errors()[:-1], 5.0, "error"),
         (TIME, errors().T, 5.0, "error"),
-        (TIME, errors()[:, :1], 5.0, "error"),
+        (TIME, errors()[:, :0], 5.0, "error"),
         (TIME[:, None], errors(), 5.0, "time"),
         (TIME, errors(np.nan), 5.0, "error"),
         (TIME, errors(0.0, np.inf), 5.0, "error"),

@@ -10,9 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from usm_gym import Conditions, Scenario
+from usm_gym.robot import Robot, Thruster
 from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.scenario import MODES, NOISE, WATER, Mode, named, sample
+from usm_gym.task.sampling import named, sample
+from usm_gym.task.scenario import MODES, NOISE, WATER, Mode
 
 Array = NDArray[np.float64]
 
@@ -253,9 +255,11 @@ def test_same_seed_same_scenario_and_no_two_seeds_alike() -> None:
 
 def test_other_robots_bend_their_own_joints() -> None:
     random = np.random.default_rng(0)
+    thrusters = (Thruster(1, "axial"), Thruster(1, "normal"), Thruster(2, "normal"))
     for joints in (1, 2, 4, 9):
+        robot = Robot(links=joints + 1, thrusters=thrusters)
         bending = {
-            sample("operation", PRESETS["field"], random, joints).inspection.bending_joints
+            sample("operation", PRESETS["field"], random, robot).inspection.bending_joints
             for _ in range(100)
         }
         assert min(bending) >= 1

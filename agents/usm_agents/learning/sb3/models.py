@@ -1,7 +1,8 @@
-"""The algorithms that train agents, and the settings of each."""
+"""Models of Stable-Baselines3 for the residual task, and the network that acts in each."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +18,6 @@ from torch import nn
 
 from usm_agents.artifact.network import Network, Recurrence
 
-# Rewards are multiplied by this in training, so that returns are of order one.
-REWARD_SCALE = 0.1
 CLASSES: dict[str, type[BaseAlgorithm]] = {
     "ppo": PPO,
     "recurrent-ppo": RecurrentPPO,
@@ -27,45 +26,10 @@ CLASSES: dict[str, type[BaseAlgorithm]] = {
     "tqc": TQC,
 }
 ON_POLICY = ("ppo", "recurrent-ppo")
-# Robots side by side: for PPO a rollout is many robots by few steps, so that little time is spent
-# between steps; the others learn after each step of all.
-ROBOTS = {"ppo": 256, "recurrent-ppo": 256, "sac": 32, "td3": 32, "tqc": 32}
-
-_PPO: dict[str, Any] = {
-    "hidden": (128, 128),
-    "n_steps": 64,
-    "batch_size": 1024,
-    "n_epochs": 6,
-    "learning_rate": 5e-4,
-    "gamma": 0.97,
-    "gae_lambda": 0.95,
-    "target_kl": 0.03,
-    "log_std_init": -1.5,  # small exploration around the base
-}
-_OFF_POLICY: dict[str, Any] = {
-    "hidden": (64, 64),
-    "learning_rate": 5e-4,
-    "buffer_size": 300_000,
-    "learning_starts": 10_000,
-    "batch_size": 256,
-    "gamma": 0.97,
-    "train_freq": 1,
-    "gradient_steps": 2,
-}
-# Widths of the hidden layers, units of the memory before them, and arguments that are not defaults.
-# The rate of PPO falls linearly to a tenth over the training; TD3 explores with independent noise
-# of that deviation.
-SETTINGS: dict[str, dict[str, Any]] = {
-    "ppo": _PPO,
-    "recurrent-ppo": _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_epochs": 4},
-    "sac": _OFF_POLICY | {"ent_coef": "auto_0.01"},
-    "td3": _OFF_POLICY | {"noise": 0.2},
-    "tqc": _OFF_POLICY | {"ent_coef": "auto_0.01"},
-}
 
 
 @dataclass(frozen=True)
-class Falling:
+class LinearDecay:
     """A learning rate that falls linearly to a tenth over the training."""
 
     start: float
@@ -75,9 +39,16 @@ class Falling:
         return self.start * (0.1 + 0.9 * remaining)
 
 
-def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
-    """A new model, whose deterministic actions are nearly zero, so that the base acts as it is."""
-    arguments: dict[str, Any] = dict(SETTINGS[algorithm])
+def make_model(algorithm: str, settings: Mapping[str, Any], env: VecEnv) -> BaseAlgorithm:
+    """Make a model whose deterministic actions are nearly zero, so that the base acts as it is.
+
+    Args:
+        algorithm: A name of `CLASSES`.
+        settings: As in `usm_agents.learning.settings`.
+        env: Robots on the residual task.
+    """
+    arguments: dict[str, Any] = dict(settings)
+    del arguments["robots"], arguments["reward_scale"]
     policy: dict[str, Any] = {"net_arch": list(arguments.pop("hidden"))}
     kind = "MlpPolicy"
     if algorithm == "recurrent-ppo":
@@ -85,7 +56,7 @@ def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
     if algorithm in ON_POLICY:
         policy["activation_fn"] = nn.Tanh
         policy["log_std_init"] = arguments.pop("log_std_init")
-        arguments["learning_rate"] = Falling(arguments["learning_rate"])
+        arguments["learning_rate"] = LinearDecay(arguments["learning_rate"])
     if algorithm == "td3":
         assert isinstance(env.action_space, Box)
         zero = np.zeros(env.action_space.shape)
@@ -100,7 +71,7 @@ def make_model(algorithm: str, env: VecEnv) -> BaseAlgorithm:
 
 
 def network_of(algorithm: str, model: Any) -> Network:
-    """The part of a model that acts, deterministically, without torch."""
+    """Copy the part of a model that acts, deterministically, without torch."""
     layers = _layers(algorithm, model)
     on_policy = algorithm in ON_POLICY
     return Network(

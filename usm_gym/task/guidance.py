@@ -1,9 +1,14 @@
-"""What the robot is asked to do: the path of the centre of mass, joint references, the heading."""
+"""What the robot is asked to do: the path of its centre of mass, and the heading on it."""
 
 from __future__ import annotations
 
 from usm_gym.kernels.compile import compiled, piece
-from usm_gym.kernels.elementary import arctan, exp_of_negative, sincos
+from usm_gym.kernels.elementary import arctan, sincos
+
+# Rows of a block beside those of the body: the path, and guidance, which is what the heading is and
+# what the line of sight aims at.
+SPEED, SWAY, FREQUENCY, RAMP, LOOK_AHEAD, CROSS_TRACK, HEAD_HEADING = range(7)
+GUIDANCE_ROWS = 7
 
 
 @piece
@@ -34,40 +39,6 @@ def path_positions(times, speed, sway, frequency, ramp, positions):
         p_x, p_y, _, _, _, _ = path(times[k], speed, sway, frequency, ramp)
         positions[k, 0] = p_x
         positions[k, 1] = p_y
-
-
-@compiled
-def filter_coefficients(frequency, step):
-    """The critically damped filter x'' = w^2 (target - x) - 2 w x' over one physics step, exactly.
-
-    Args:
-        frequency: w, rad/s; 0 for no filter, the reference then being the target itself.
-        step: Physics step, s.
-
-    Returns:
-        (x from x, x from x', x' from x, x' from x', w^2, 2 w), x measured from the target; all
-        zero without a filter.
-    """
-    if frequency == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    wh = frequency * step
-    decay = exp_of_negative(-wh)
-    return (
-        decay * (1.0 + wh),
-        decay * step,
-        -decay * frequency * wh,
-        decay * (1.0 - wh),
-        frequency * frequency,
-        2.0 * frequency,
-    )
-
-
-@compiled
-def lag_share(time_constant, step):
-    """Share of the way to its command that a thruster covers in a physics step, 1 - e^(-h/tau)."""
-    if time_constant == 0.0:
-        return 1.0
-    return 1.0 - exp_of_negative(-step / time_constant)
 
 
 @piece

@@ -1,4 +1,4 @@
-"""The Stable-Baselines3 face of the native vector environment."""
+"""The native vector environment as Stable-Baselines3 sees it."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
-from usm_agents.learning.sb3_vec_env import SB3VecEnv
+from usm_agents.learning.sb3.vec_env import SB3VecEnv
 
 import usm_gym
 
@@ -18,7 +18,7 @@ ID = "USM-Operation-v0"
 HARD = {"thruster_limit": 3.0, "current_limit": 0.3}
 
 
-def face(count, **arguments):
+def vec_env(count, **arguments):
     return SB3VecEnv(
         gym.make_vec(
             ID,
@@ -31,7 +31,7 @@ def face(count, **arguments):
 
 
 def test_it_behaves_as_sb3s_own_over_monitored_environments():
-    envs = face(3, conditions=HARD)
+    envs = vec_env(3, conditions=HARD)
     reference = DummyVecEnv([lambda: Monitor(gym.make(ID, conditions=HARD))] * 3)
     for each in (envs, reference):
         each.seed(5)
@@ -57,7 +57,7 @@ def test_it_behaves_as_sb3s_own_over_monitored_environments():
 
 
 def test_a_time_limit_is_told_from_a_loss():
-    envs = face(2)
+    envs = vec_env(2)
     policy = usm_baselines.make("sta", envs)
     observations, state = envs.reset(), None
     for _ in range(2000):
@@ -68,7 +68,7 @@ def test_a_time_limit_is_told_from_a_loss():
 
 
 def test_attributes_methods_and_options():
-    envs = face(3)
+    envs = vec_env(3)
     assert envs.get_attr("nominal", indices=[0, 2]) == [envs.get_attr("nominal")[0]] * 2
     envs.set_attr("note", 7)
     assert envs.get_attr("note") == [7, 7, 7]
@@ -83,7 +83,7 @@ def test_attributes_methods_and_options():
 
 
 def test_evaluate_policy_scores_a_scripted_policy():
-    envs = face(4)
+    envs = vec_env(4)
     envs.seed(0)
     rewards, lengths = evaluate_policy(
         usm_baselines.make("sta", envs), envs, n_eval_episodes=4, return_episode_rewards=True
@@ -92,14 +92,16 @@ def test_evaluate_policy_scores_a_scripted_policy():
     assert min(rewards) > -8000
 
 
+@pytest.mark.slow
 def test_ppo_trains_on_it():
-    envs = face(16)
+    envs = vec_env(16)
     model = PPO("MlpPolicy", envs, n_steps=64, batch_size=256, n_epochs=2, seed=0, device="cpu")
     model.learn(4096)
     scores = usm_gym.evaluate(model, usm_gym.suite("operation")[:2])
     assert np.isfinite(scores.per_episode["max_error_x"]).all()
 
 
+@pytest.mark.slow
 def test_a_model_with_its_environment_is_scored_by_several_workers():
     model = PPO("MlpPolicy", "usm_gym:USM-Operation-v0", device="cpu", seed=0)
     assert model.get_env().render_mode == "rgb_array"
@@ -109,7 +111,7 @@ def test_a_model_with_its_environment_is_scored_by_several_workers():
         np.testing.assert_allclose(two.per_episode[name], values, rtol=1e-3)
 
 
-def test_the_residual_task_has_this_face_too():
+def test_the_residual_task_is_one_too():
     envs = gym.make_vec(
         "usm_agents:USM-OperationResidual-v0",
         num_envs=3,
@@ -117,7 +119,7 @@ def test_the_residual_task_has_this_face_too():
         autoreset_mode="SameStep",
         conditions=HARD,
     )
-    scaled, plain = SB3VecEnv(envs, reward_scale=0.1), face(3, conditions=HARD)
+    scaled, plain = SB3VecEnv(envs, reward_scale=0.1), vec_env(3, conditions=HARD)
     policy = usm_baselines.make("sta", plain)
     for each in (scaled, plain):
         each.seed(5)

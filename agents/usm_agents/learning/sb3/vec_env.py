@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from usm_agents.residual.env import ResidualVectorEnv
-from usm_gym.envs.vector_env import USMVectorEnv
+from usm_gym.envs.usm import USMVectorEnv
 from usm_gym.support.validation import require
 
 
@@ -38,7 +38,7 @@ class SB3VecEnv(VecEnv):
             reward_scale: Factor on the rewards of steps; the returns in infos are left as they are.
 
         Raises:
-            ValueError: If it is none of this package, or restarts episodes otherwise.
+            ValueError: If it is of another package, or does not restart episodes within a step.
         """
         plain = envs.unwrapped
         require(
@@ -57,7 +57,7 @@ class SB3VecEnv(VecEnv):
         self._envs: Any = envs
         self._reward_scale = reward_scale
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
-        self._begin = time.time()
+        self._began = time.time()
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
 
@@ -94,7 +94,7 @@ class SB3VecEnv(VecEnv):
                 "episode": {
                     "r": float(self._returns[index]),
                     "l": int(self._lengths[index]),
-                    "t": round(time.time() - self._begin, 6),
+                    "t": round(time.time() - self._began, 6),
                 },
             }
         self._returns[done] = 0.0

@@ -12,8 +12,9 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 from support import oracle
-from usm_baselines.laws.policy import ScriptedPolicy
+from usm_baselines import policy as policy_module
 from usm_baselines.laws.super_twisting import SuperTwistingGains
+from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
 
 from usm_gym import Robot
@@ -154,23 +155,69 @@ def test_deterministic_or_not_is_the_same(id: str) -> None:
 class Probe(ScriptedPolicy):
     """A law that asks for a fixed force and keeps what it saw."""
 
-    law_size = 1
+    Gains = SuperTwistingGains
+    state = ("calls", "error")
 
-    def force(self, signals: Signals, law_state: Array) -> Array:
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
         self.seen = signals
-        law_state += 1.0
-        return np.tile([3.0, -2.0], (len(signals.y), 1))
-
-
-def test_the_law_state_is_what_the_law_left() -> None:
-    policy, seen = probe(), observations(2, 3)
-    _, state = policy.predict(seen[0])
-    _, state = policy.predict(seen[1], state)
-    assert np.array_equal(policy.law_state(state), np.full((3, 2, 1), 2.0))
+        state[:, :, 0] += 1.0
+        state[:, :, 1] = signals.y
+        force[:] = [3.0, -2.0]
 
 
 def probe() -> Probe:
-    return Probe(gym.make("USM-Operation-v0").unwrapped.nominal, SuperTwistingGains())
+    return Probe(gym.make("USM-Operation-v0").unwrapped.nominal)
+
+
+def test_the_state_is_what_the_law_left_by_its_names() -> None:
+    policy, seen = probe(), observations(2, 3)
+    _, state = policy.predict(seen[0])
+    _, state = policy.predict(seen[1], state)
+    left = policy.state_of(state)
+    assert list(left) == ["calls", "error"]
+    assert np.array_equal(left["calls"], np.full((3, 2), 2.0))
+    assert np.array_equal(left["error"], policy.seen.y)
+
+
+@pytest.mark.parametrize("id", SCRIPTED[:-1])
+def test_every_law_names_its_numbers(id: str) -> None:
+    policy, seen = made(id), observations(12, 3)
+    state = None
+    for now in seen:
+        _, state = policy.predict(now, state)
+    left = policy.state_of(state)
+    assert set(policy.shown) <= set(left)
+    assert all(numbers.shape == (3, 2) for numbers in left.values())
+    if "error" in left:  # an estimate, millimetres from what is measured
+        measured = seen[-1][:, LAYOUT.slices["position_error"]] * 0.01
+        np.testing.assert_allclose(left["error"], measured, atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    "id", ["sta", "sta-explicit", "pd", "pid", "ladrc", "smc", "gsta", "agsta"]
+)
+def test_laws_do_not_know_how_many_axes_there_are(id: str) -> None:
+    policy = made(id)
+    rng = np.random.default_rng(0)
+    (y, u, velocity, acceleration), started = rng.normal(0.0, 0.1, (4, 2, 3)), np.zeros(2)
+    rest = {"allocation": np.zeros((2, 4, 3)), "observation": np.zeros((2, 90), np.float32)}
+    whole, parts = np.zeros((2, 3, len(policy.state))), np.zeros((3, 2, 1, len(policy.state)))
+    force, part = np.empty((2, 3)), np.empty((2, 1))
+    for _ in range(3):
+        policy.control(Signals(started, y, u, velocity, acceleration, **rest), whole, force)
+        for axis, own in enumerate(parts):
+            one = (each[:, [axis]].copy() for each in (y, u, velocity, acceleration))
+            policy.control(Signals(started, *one, **rest), own, part)
+            assert np.array_equal(force[:, [axis]], part)
+        started, y = np.ones(2), y + 0.01
+
+
+@pytest.mark.parametrize("id", ["lqg", "lqg-joints", "mpc", "oracle"])
+def test_laws_of_the_planar_robot_refuse_others(id: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model_of = policy_module.model_of
+    monkeypatch.setattr(policy_module, "model_of", lambda known: model_of(known)._replace(axes=3))
+    with pytest.raises(ValueError, match="axes is 3; allowed: 2, of the planar robot"):
+        made(id)
 
 
 def angles(observation: NDArray[np.float32]) -> Array:
@@ -233,9 +280,13 @@ def test_the_action_makes_the_force_and_a_moment_against_the_heading_error() -> 
 
 def test_a_law_without_a_state_of_its_own_may_be_written() -> None:
     class Stateless(Probe):
-        law_size = 0
+        state = ()
 
-    policy = Stateless(gym.make("USM-Operation-v0").unwrapped.nominal, SuperTwistingGains())
+        def control(self, signals: Signals, state: Array, force: Array) -> None:
+            assert state.shape == (3, 2, 0)
+            force[:] = 0.0
+
+    policy = Stateless(gym.make("USM-Operation-v0").unwrapped.nominal)
     action, state = policy.predict(observations(1, 3)[0])
     assert action.shape == (3, 5)
     policy.predict(observations(1, 3)[0], state)

@@ -1,0 +1,1 @@
+"""Stable-Baselines3 as the learner: all that imports torch."""

@@ -1,0 +1,131 @@
+"""Algorithms of Stable-Baselines3 as learners."""
+
+from __future__ import annotations
+
+import pickle
+import random
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.utils import set_random_seed
+
+from usm_agents.artifact.network import Network
+from usm_agents.learning.divergence import check_weights
+from usm_agents.learning.learner import TrainingSetup
+from usm_agents.learning.sb3.models import CLASSES, make_model, network_of
+from usm_agents.learning.sb3.vec_env import SB3VecEnv
+
+MODEL, REPLAY, STATES = "model.zip", "replay.pickle", "states.pickle"
+
+
+class SB3Learner:
+    """An algorithm of Stable-Baselines3, on one thread; a `Learner`."""
+
+    def __init__(self, setup: TrainingSetup) -> None:
+        """Make the model, whose actions are nearly zero."""
+        # With one thread, sums are added in the same order on every machine.
+        torch.set_num_threads(1)
+        set_random_seed(setup.seed)
+        self._setup = setup
+        self._vec_env = SB3VecEnv(setup.envs, setup.settings["reward_scale"])
+        self._vec_env.action_space.seed(setup.seed)
+        self._model = make_model(setup.algorithm, setup.settings, self._vec_env)
+        self._started = False
+
+    @property
+    def steps(self) -> int:
+        """Control periods learned from so far, over all robots."""
+        return self._model.num_timesteps
+
+    def learn(self, steps: int, pause: Callable[[], None]) -> None:
+        """Learn until so many control periods are done and the rollout has ended; see `Learner`."""
+        first, self._started = not self._started, True
+        if first:
+            self._vec_env.seed(self._setup.episode_seed)
+            self._vec_env.set_options([{"scenario": each} for each in self._setup.first_episodes])
+        self._model.set_logger(configure(str(self._setup.folder), ["tensorboard"]))
+
+        def before_rollout() -> None:
+            self._check()
+            pause()
+
+        try:
+            self._model.learn(
+                steps - self.steps,
+                callback=BeforeRollout(before_rollout),
+                reset_num_timesteps=first,
+            )
+        except ValueError:
+            self._check()  # torch refuses distributions of what is no number
+            raise
+        self._check()
+
+    def export(self) -> Network:
+        """Copy the part of the model that acts."""
+        return network_of(self._setup.algorithm, self._model)
+
+    def log(self, numbers: Mapping[str, float]) -> None:
+        """Write numbers to the log for TensorBoard, with those of the algorithm since the last."""
+        for name, number in numbers.items():
+            self._model.logger.record(name, number)
+        self._model.logger.dump(self.steps)
+
+    def save(self, checkpoint: Path) -> None:
+        """Write model, replay buffer, robots and random states, as pickles for the most part."""
+        self._model.save(checkpoint / MODEL)
+        if hasattr(self._model, "save_replay_buffer"):
+            with open(checkpoint / REPLAY, "wb") as file:
+                self._model.save_replay_buffer(file)
+        # What a recurrent policy remembers of the episodes in progress, its model does not save.
+        lstm_states = getattr(self._model, "_last_lstm_states", None)
+        states = self._vec_env.snapshot(), lstm_states, _random_states()
+        (checkpoint / STATES).write_bytes(pickle.dumps(states))
+
+    def restore(self, checkpoint: Path) -> None:
+        """Go back to what `save` wrote, which is code and is run."""
+        self._model = CLASSES[self._setup.algorithm].load(
+            checkpoint / MODEL, env=self._vec_env, device="cpu", force_reset=False
+        )
+        if (checkpoint / REPLAY).exists():
+            self._model.load_replay_buffer(checkpoint / REPLAY, truncate_last_traj=False)  # type: ignore[attr-defined]
+        robots, lstm_states, random_states = pickle.loads((checkpoint / STATES).read_bytes())
+        self._vec_env.restore(robots)
+        if lstm_states is not None:
+            self._model._last_lstm_states = lstm_states  # type: ignore[attr-defined]
+        _set_random_states(random_states)
+        self._started = True
+
+    def _check(self) -> None:
+        check_weights(each.detach().numpy() for each in self._model.policy.parameters())
+
+
+class BeforeRollout(BaseCallback):
+    """Calls a function before each rollout."""
+
+    def __init__(self, function: Callable[[], None]) -> None:
+        """Take the function."""
+        super().__init__()
+        self._function = function
+
+    def _on_rollout_start(self) -> None:
+        self._function()
+
+    def _on_step(self) -> bool:
+        return True
+
+
+def _random_states() -> tuple[Any, Any, torch.Tensor]:
+    """The states of the global streams from which Stable-Baselines3 draws."""
+    return random.getstate(), np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
+
+
+def _set_random_states(states: tuple[Any, Any, torch.Tensor]) -> None:
+    python, numpy, torchs = states
+    random.setstate(python)
+    np.random.set_state(numpy)  # noqa: NPY002
+    torch.set_rng_state(torchs)

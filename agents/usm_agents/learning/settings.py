@@ -1,0 +1,46 @@
+"""Settings of the algorithms that train agents: learning rates, batches, layers, robots.
+
+Names without a comment are arguments of Stable-Baselines3; what is not named has its default there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+# Rewards are multiplied by this in training, so that returns are of order one.
+REWARD_SCALE = 0.1
+
+_PPO: dict[str, Any] = {
+    "hidden": (128, 128),  # widths of the hidden layers
+    "n_steps": 64,
+    "batch_size": 1024,
+    "n_epochs": 6,
+    "learning_rate": 5e-4,  # at the start; falls linearly to a tenth over the training
+    "gamma": 0.97,
+    "gae_lambda": 0.95,
+    "target_kl": 0.03,
+    "log_std_init": -1.5,  # small exploration around the base
+}
+_RECURRENT = _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_epochs": 4}  # LSTM units
+_REPLAY: dict[str, Any] = {
+    "hidden": (64, 64),
+    "learning_rate": 5e-4,
+    "buffer_size": 300_000,
+    "learning_starts": 10_000,
+    "batch_size": 256,
+    "gamma": 0.97,
+    "train_freq": 1,
+    "gradient_steps": 2,
+}
+# Robots swim side by side. For PPO a rollout is many robots by few steps, so that little time is
+# spent between steps; the others learn after each step of all robots.
+_MANY = {"robots": 256, "reward_scale": REWARD_SCALE}
+_FEW = {"robots": 32, "reward_scale": REWARD_SCALE}
+
+SETTINGS: dict[str, dict[str, Any]] = {
+    "ppo": _PPO | _MANY,
+    "recurrent-ppo": _RECURRENT | _MANY,
+    "sac": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
+    "td3": _REPLAY | {"noise": 0.2} | _FEW,  # standard deviation, independent in each step
+    "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
+}

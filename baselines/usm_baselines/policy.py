@@ -1,0 +1,152 @@
+"""What all control laws share: gains, state, and how a law acts behind `predict`.
+
+State is a plain array that the caller carries from call to call, in the manner of
+Stable-Baselines3's recurrent policies.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
+from usm_baselines.space import Gain, declared
+from usm_gym.robot import Robot
+from usm_gym.support.validation import require
+from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
+
+# The gain of the heading controller, which all laws share.
+HEADING_GAIN = Gain(100.0, "N m/rad", "heading gain k_psi", tuned=(30.0, 300.0))
+
+
+class ScriptedPolicy:
+    """A control law behind `predict`; subclasses give `Gains`, `state` and `control`.
+
+    Actions are not clipped: the environment saturates them, and what it has applied comes back in
+    the next observation.
+
+    Attributes:
+        nominal: What the policy knows of the robot.
+        gains: The law's gains, one of its `Gains`.
+        privileged: Whether it has to be given true state; never, here.
+    """
+
+    privileged = False
+    # The law's gains: a `NamedTuple` of `Gain`, with the field `heading_gain`.
+    Gains: type[Any]
+    # Names of the numbers that the law keeps for each axis, in order.
+    state: tuple[str, ...] = ()
+    # Those among them that tell more than the observation does: estimates, adapted gains.
+    shown: tuple[str, ...] = ()
+    # Whether the law computes with the inertia, drag or plant of the planar robot.
+    planar = False
+
+    def __init__(self, nominal: Nominal, **gains: float) -> None:
+        """Take gains other than the defaults by name.
+
+        Raises:
+            ValueError: If a gain is not finite, is negative, or is 0 and has to be positive; or if
+                the law is for planar robots and this is another.
+        """
+        chosen = self.Gains(**gains)
+        for name, gain in declared(self.Gains).items():
+            value = getattr(chosen, name)
+            number = isinstance(value, (int, float)) and np.isfinite(value) and value >= 0
+            require(number, name, value, "a finite number >= 0")
+            require(value > 0 or not gain.positive, name, value, "a number > 0")
+        self.nominal = nominal
+        self.gains = self.Gains(*map(float, chosen))
+        self._world, self._model = world_of(nominal.robot), model_of(nominal)
+        # Before the law's own numbers stand those that all laws share.
+        self._own = shared_size(self._model)
+        fitting = isinstance(nominal.robot, Robot) or not self.planar
+        require(fitting, "robot", nominal.robot, "the planar robot")
+
+    @property
+    def columns(self) -> dict[str, NDArray[np.int64]]:
+        """Columns of what `predict` returns that hold the numbers of `state`, by name, (axes,)."""
+        first = self._own + len(self.state) * np.arange(self._model.axes, dtype=np.int64)
+        return {name: first + index for index, name in enumerate(self.state)}
+
+    def state_of(self, state: Array) -> dict[str, Array]:
+        """The law's own numbers in what `predict` returns, by name, each (batch, axes)."""
+        return {name: state[:, column] for name, column in self.columns.items()}
+
+    @property
+    def law_shape(self) -> tuple[int, ...]:
+        """Shape of all that the law keeps of one robot, the numbers of `state` first."""
+        return (self._model.axes, len(self.state))
+
+    def control(self, signals: Signals, state: Array, force: Array) -> None:
+        """Fill in the force on the centre of mass, N, and advance the law's state.
+
+        Args:
+            signals: What the law works with.
+            state: What the law keeps, (batch, *law_shape), zero at the start.
+            force: Where to write the force, (batch, axes).
+        """
+        raise NotImplementedError
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Array | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Act on one observation, or on each of a batch.
+
+        Args:
+            observation: Observation, (numbers,) or (batch, numbers).
+            state: What the last call returned; None at the start.
+            episode_start: Where an episode starts and the state is to be forgotten, bool, a scalar
+                or (batch,).
+            deterministic: Without effect: the laws are deterministic.
+
+        Returns:
+            Thruster commands over the limit, not clipped, (thrusters,) or (batch, thrusters), and
+            the state for the next call.
+
+        Raises:
+            ValueError: If the shape of the observation or the state is wrong.
+        """
+        seen = np.asarray(observation, np.float32)
+        numbers = self._model.scale.size
+        require(
+            seen.ndim in (1, 2) and seen.shape[-1] == numbers,
+            "the observation's shape",
+            seen.shape,
+            f"({numbers},) or (batch, {numbers})",
+        )
+        batch = seen.reshape(-1, numbers)
+        new_state = self._state(len(batch), state, episode_start)
+        action = self._act(batch, new_state)
+        return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
+
+    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
+        size = len(observation)
+        signals = signals_of(observation, self._model, self._world)
+        sense(state, self._model, signals)
+        own = state[:, self._own :].copy().reshape(size, *self.law_shape)
+        force = np.empty_like(signals.y)
+        self.control(signals, own, force)
+        state[:, self._own :] = own.reshape(size, -1)
+        action = np.empty((size, self._model.thrusters), np.float32)
+        gain = self.gains.heading_gain
+        act(observation, state, self._model, signals.allocation, force, gain, action)
+        return action
+
+    def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:
+        numbers = self._own + math.prod(self.law_shape)
+        if state is None:
+            return np.zeros((size, numbers))
+        new = np.array(state, np.float64)
+        require(new.shape == (size, numbers), "state", new.shape, f"shape ({size}, {numbers})")
+        if episode_start is not None:
+            start = np.asarray(episode_start, bool)
+            new[start if start.shape == (size,) else np.broadcast_to(start, (size,))] = 0.0
+        return new

@@ -1,0 +1,173 @@
+"""The environments of the paper's robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gymnasium.vector import AutoresetMode
+
+from usm_gym.envs.env import TrackingEnv
+from usm_gym.envs.vector_env import TrackingVectorEnv, checked_number
+from usm_gym.rendering.viewer import RENDER_MODES, Viewer
+from usm_gym.robot import Robot
+from usm_gym.robots import robot_of
+from usm_gym.support.validation import is_whole, require
+from usm_gym.task.conditions import Conditions, conditions_of
+from usm_gym.task.observation import ObservationLayout
+from usm_gym.task.sampling import ModeSampler
+from usm_gym.task.scenario import Mode, mode_of
+
+
+class USMEnv(TrackingEnv):
+    """An underwater swimming manipulator whose centre of mass has to follow a path.
+
+    Sixteen links, five thrusters. The thrusters hold the centre of mass on a slow path; in
+    operation mode (`usm_gym:USM-Operation-v0`) the joints meanwhile bend the head side of the body
+    one way, the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
+    (`usm_gym:USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the
+    line of sight. The score of an episode is the largest true position error in each axis after
+    settling.
+
+    ## Action
+
+    `Box(-1, 1, (5,), float32)`: commands of the thrusters over their limit (20 N in "field");
+    values beyond saturate, a wrong shape or a value that is not a number raises `ValueError`.
+
+    | index | thruster | positive force |
+    |---|---|---|
+    | 0 | link 1 (tail), along the link | towards the head |
+    | 1 | link 3, across | to the left of the link |
+    | 2 | link 6, across | to the left |
+    | 3 | link 11, across | to the left |
+    | 4 | link 14 (head side), across | to the left |
+
+    ## Observation
+
+    `Box(float32)` of 90 numbers, the same in both modes: physical value over scale. Every error is
+    actual minus reference. Angles are never wrapped. The true velocity of the centre of mass, the
+    current and the true coefficients are not observed.
+
+    OBSERVATION_TABLE
+
+    ## Reward
+
+    r = -10 mean_axes |e| / (|e| + 0.02 m) - 0.1 mean_thrusters |command| / limit, with the true
+    position error e after the step. The step that loses the robot costs -10.1 for itself and for
+    every step that remains, so that ending early never pays.
+
+    ## Start
+
+    Straight, at rest, on the reference. `reset(seed=...)` draws a scenario of the mode from
+    `env.np_random`. `reset(options={"scenario": s})` takes s = "nominal" or "table1", under the
+    environment's conditions, or a `Scenario` or its dict, which brings its own.
+
+    ## End
+
+    Truncation at the scenario's duration (40 s, 2000 steps). Termination when the robot is lost:
+    the true error exceeds 0.5 m in an axis, or the state is no longer finite; the observation is
+    finite all the same.
+
+    ## Info, at every step
+
+    | key | unit | meaning |
+    |---|---|---|
+    | `error_x`, `error_y` | m | true position error |
+    | `max_error_x`, `max_error_y` | m | its largest absolute value since settling; 0 before |
+    | `heading_error` | rad | heading minus its reference, as known on board |
+    | `thrust_effort` | N | mean absolute command of the thrusters |
+    | `diverged` | 0 or 1 | whether the robot is lost |
+
+    All values are `numpy.float64`, which is a `float`, so that JSON takes them.
+
+    ## Arguments
+
+    | argument | default | meaning |
+    |---|---|---|
+    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of `Conditions` fields |
+    | `robot` | the paper's | a dict of `Robot` fields |
+    | `render_mode` | None | `"rgb_array"`: `render()` gives an image of 640 x 480; `"human"`: a \
+window shows every step in real time (drawing needs the extra `render`) |
+
+    ## Version history
+
+    - v0: first version.
+    """
+
+    # One frame for each control period; an instance corrects the rate if it has another period.
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 (Gymnasium's)
+
+    def __init__(
+        self,
+        mode: Mode,
+        conditions: str | Mapping[str, Any] | Conditions = "field",
+        robot: str | Mapping[str, Any] | Robot | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        """Make the environment; no random number is drawn before `reset`.
+
+        Raises:
+            ValueError: If a condition, a field of the robot or the render mode is not allowed.
+        """
+        self.mode: Mode = mode_of(mode)
+        self.conditions, self.robot = conditions_of(conditions), robot_of(robot)
+        viewer = None if render_mode is None else Viewer(render_mode)
+        super().__init__(ModeSampler(self.mode, self.conditions, self.robot), viewer)
+
+
+# The class docstring is the specification; its table comes from the one that the code uses.
+USMEnv.__doc__ = (USMEnv.__doc__ or "").replace(
+    "OBSERVATION_TABLE", ObservationLayout(16, 5).table().replace("\n", "\n    ")
+)
+
+
+class USMVectorEnv(TrackingVectorEnv):
+    """`num_envs` underwater swimming manipulators, each as in `USMEnv`, with the same bits.
+
+    Made by `gym.make_vec("usm_gym:USM-Operation-v0", num_envs=256,
+    vectorization_mode="vector_entry_point")`. Spaces, reward, start, end and info are those of
+    `USMEnv` with a batch axis; robot i with seed s behaves as the single environment with seed s.
+
+    `reset(seed=s)` gives robot i the seed s + i; a list gives each its own. The option "scenario"
+    is for all robots, or a list with one for each (None draws one); the option "reset_mask", a bool
+    array, resets only some. All three autoreset modes are supported: "NextStep" (Gymnasium's
+    default), "SameStep" with `final_obs` and `final_info`, and "Disabled".
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES)}  # noqa: RUF012 (Gymnasium's)
+
+    def __init__(
+        self,
+        num_envs: int,
+        mode: Mode,
+        conditions: str | Mapping[str, Any] | Conditions = "field",
+        robot: str | Mapping[str, Any] | Robot | None = None,
+        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int = 1,
+        render_index: int = 0,
+    ) -> None:
+        """Make the environment.
+
+        Args:
+            num_envs: How many robots.
+            mode: "operation" or "torpedo".
+            conditions: As of `USMEnv`.
+            robot: As of `USMEnv`.
+            render_mode: As of `USMEnv`: "rgb_array" gives an image of each robot, "human" shows one
+                robot in a window.
+            autoreset_mode: What happens to a robot whose episode has ended.
+            threads: How many threads share a step, at most one per core; without effect on its
+                result.
+            render_index: Which robot the window shows.
+
+        Raises:
+            ValueError: If an argument is not allowed.
+        """
+        last = checked_number(num_envs) - 1
+        require(is_whole(render_index, 0, last), "render_index", render_index, f"0 to {last}")
+        self.mode: Mode = mode_of(mode)
+        self.conditions, self.robot = conditions_of(conditions), robot_of(robot)
+        viewer = None if render_mode is None else Viewer(render_mode, num_envs, render_index)
+        sampler = ModeSampler(self.mode, self.conditions, self.robot)
+        super().__init__(num_envs, sampler, autoreset_mode, threads, viewer)

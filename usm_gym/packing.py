@@ -1,0 +1,83 @@
+"""A robot and what it is run with, as the numbers that the plant's kernels take."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from usm_gym.plant import layout as rows
+from usm_gym.plant.joints import filter_coefficients
+from usm_gym.plant.step import Plant
+from usm_gym.plant.thrusters import lag_share
+from usm_gym.robot import Hydrodynamics, Robot
+
+
+def plant_of(
+    robot: Robot,
+    step: float,
+    *,
+    substeps: int = 1,
+    implicit: bool = True,
+    hydrodynamics: Hydrodynamics = "consistent",
+    shifts: int = 0,
+    moving_water: bool = False,
+) -> Plant:
+    """What all copies of a robot share.
+
+    Args:
+        robot: The robot.
+        step: Physics step, s.
+        substeps: Physics steps in a control period.
+        implicit: Whether drag and joint controllers are taken implicitly.
+        hydrodynamics: Form of the added mass.
+        shifts: Largest number of changes of the joint references in any episode.
+        moving_water: Whether the water's velocity changes in any episode.
+    """
+    return Plant(
+        l=robot.half_length,
+        m=robot.link_mass,
+        J=robot.link_inertia,
+        implicit=step if implicit else 0.0,
+        kirchhoff=float(hydrodynamics == "consistent"),
+        links=robot.links,
+        thruster_links=robot.thruster_links,
+        thruster_is_normal=robot.thruster_is_normal,
+        h=step,
+        substeps=substeps,
+        shifts=shifts,
+        moving_water=moving_water,
+    )
+
+
+def body_row(
+    robot: Robot,
+    plant: Plant,
+    *,
+    coefficients: ArrayLike = 1.0,
+    joint_gains: tuple[float, float] | None = None,
+    filter_frequency: float = 0.0,
+    time_constant: float = 0.0,
+) -> NDArray[np.float64]:
+    """The rows of a robot at rest in still water, straight, nothing being asked of its joints.
+
+    Args:
+        robot: The robot.
+        plant: What `plant_of` made of it.
+        coefficients: True over nominal hydrodynamic coefficients, (6,).
+        joint_gains: Stiffness and damping of the joints other than the robot's, N m/rad, N m s/rad.
+        filter_frequency: Natural frequency of the joint references' filter, rad/s; 0 for none.
+        time_constant: First-order lag of the thrusters, s.
+    """
+    links = robot.links
+    row = np.zeros(rows.body_rows(links, len(robot.thrusters)))
+    nominal = np.array(robot.hydrodynamic_coefficients)
+    row[rows.C_T : rows.LAMBDA_3 + 1] = nominal * coefficients
+    k_p, k_d = joint_gains or (robot.joint_stiffness, robot.joint_damping)
+    row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
+    row[rows.JOINT_INERTIA] = plant.implicit * k_d + plant.implicit**2 * k_p
+    side = rows.row_of(rows.SIDE, links)
+    row[side : side + links] = rows.sides(links)
+    row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(filter_frequency, plant.h)
+    row[rows.SHIFT_TIME : rows.SHIFT_SIZE] = rows.NEVER
+    row[rows.LAG] = lag_share(time_constant, plant.h)
+    return row

@@ -1,0 +1,261 @@
+"""The world of the paper's robot: a chain of links in a plane that follows a path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import ClassVar
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.kernels.compile import compiled, parallel, piece
+from usm_gym.kernels.lanes import WIDTH, block_at, spread
+from usm_gym.packing import body_row, plant_of
+from usm_gym.plant import layout as rows
+from usm_gym.plant.step import Plant, advance
+from usm_gym.plant.thrusters import command
+from usm_gym.robot import Robot
+from usm_gym.support.validation import require
+from usm_gym.task import guidance
+from usm_gym.task.observation import ObservationLayout, allocations, measure
+from usm_gym.task.scenario import Scenario
+from usm_gym.world import Array, Kernels, World, world_of
+
+# Physics steps times links of the longest episode; at a step of 1e-3 s, 16 links swim 35 hours.
+MOST_LINK_STEPS = 2_000_000_000
+
+
+@piece
+def observe(fleet, plant, table, robot, lanes):
+    """Measure one robot."""
+    measure(
+        fleet.blocks[robot // lanes],
+        lanes,
+        robot % lanes,
+        plant,
+        # A robot whose episode has ended may be stepped on until it is restarted.
+        fleet.noise[robot, min(fleet.instant[robot], fleet.noise.shape[1] - 1)],
+        table,
+        fleet.error[robot],
+        fleet.attitude_error[robot],
+        fleet.observation[robot],
+    )
+
+
+@piece
+def run(fleet, plant, table, actions, like, lanes, stride, first, last):
+    """One control period of blocks `first` to `last`: command, advance, measure."""
+    size = actions.shape[0]
+    for k in range(first, last):
+        for robot in range(k * lanes, min((k + 1) * lanes, size)):
+            fleet.effort[robot] = command(
+                fleet.blocks[k], lanes, robot - k * lanes, plant.links, actions[robot]
+            )
+        advance(block_at(fleet.blocks, k, like), like, spread(0.0), stride, plant)
+        for robot in range(k * lanes, min((k + 1) * lanes, size)):
+            fleet.instant[robot] += 1
+            observe(fleet, plant, table, robot, lanes)
+            if fleet.instant[robot] >= fleet.settled[robot]:
+                for axis in range(fleet.error.shape[1]):
+                    size_now = abs(fleet.error[robot, axis])
+                    if size_now > fleet.max_error[robot, axis]:
+                        fleet.max_error[robot, axis] = size_now
+
+
+@compiled
+def observe_one(fleet, plant, table, robot, lanes):
+    """Measure one robot outside a control period: at the start of its episode."""
+    observe(fleet, plant, table, robot, lanes)
+
+
+@compiled
+def run_singles(fleet, plant, table, actions, first, last):
+    """`run` for blocks of one robot each."""
+    run(fleet, plant, table, actions, 0.0, 1, WIDTH, first, last)
+
+
+@compiled
+def run_lanes(fleet, plant, table, actions, first, last):
+    """`run` for blocks of `lanes.WIDTH` robots each."""
+    run(fleet, plant, table, actions, spread(0.0), WIDTH, 1, first, last)
+
+
+@parallel
+def run_threads(fleet, plant, table, actions):
+    """`run_lanes` for all blocks, shared out among threads."""
+    for k in numba.prange(fleet.blocks.shape[0]):
+        run_lanes(fleet, plant, table, actions, k, k + 1)
+
+
+@dataclass(frozen=True)
+class PlanarWorld(World):
+    """A robot in a plane, and its path there.
+
+    Attributes:
+        robot: The robot.
+    """
+
+    robot: Robot
+    axes: ClassVar[tuple[str, ...]] = ("x", "y")
+    attitude: ClassVar[tuple[str, ...]] = ("heading",)
+    kernels: ClassVar[Kernels] = Kernels(observe_one, run_singles, run_lanes, run_threads)
+
+    @cached_property
+    def layout(self) -> ObservationLayout:
+        """The table of the observation."""
+        return ObservationLayout(self.links, self.thrusters)
+
+    @property
+    def links(self) -> int:
+        """Links of the robot."""
+        return self.robot.links
+
+    @property
+    def thrusters(self) -> int:
+        """Thrusters of the robot."""
+        return len(self.robot.thrusters)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the robot, kg."""
+        return self.robot.total_mass
+
+    @property
+    def rows(self) -> int:
+        """Rows of the body, then those of guidance."""
+        return self._guidance + guidance.GUIDANCE_ROWS
+
+    @cached_property
+    def quantities(self) -> Mapping[str, NDArray[np.int64]]:
+        """Rows by name; vectors in the global frame, angles from the tail, SI units.
+
+        `position`, `velocity` and `acceleration` are those of the centre of mass, `force` has the
+        thrusters' forces, which lag behind `command`, `coefficients` the true hydrodynamic ones;
+        joint i is asked for `joint_shares[i] * deflection`.
+        """
+        links = self.links
+        first = rows.first_command(links)
+        starts = {
+            "position": (rows.P_X, 2),
+            "velocity": (rows.V_X, 2),
+            "acceleration": (rows.A_X, 2),
+            "theta": (rows.row_of(rows.THETA, links), links),
+            "theta_dot": (rows.row_of(rows.OMEGA, links), links),
+            "water_velocity": (rows.WATER_X, 2),
+            "coefficients": (rows.C_T, 6),
+            "joint_shares": (rows.row_of(rows.SHARE, links), links - 1),
+            "deflection": (rows.DEFLECTION, 1),
+            "limit": (rows.LIMIT, 1),
+            "command": (first, self.thrusters),
+            "force": (first + self.thrusters, self.thrusters),
+        }
+        return {name: np.arange(row, row + size) for name, (row, size) in starts.items()}
+
+    def check(self, scenario: Scenario) -> None:
+        """Refuse a scenario that the robot cannot swim.
+
+        Raises:
+            ValueError: If more joints shall bend than it has, or the episode is too much work.
+        """
+        joints = self.links - 1
+        bending = scenario.inspection.bending_joints
+        allowed = f"1 to {joints}, the robot's joints"
+        require(bending <= joints, "bending_joints", bending, allowed)
+        steps = scenario.steps * scenario.conditions.substeps
+        longest = MOST_LINK_STEPS // self.links * scenario.conditions.physics_step
+        require(
+            steps * self.links <= MOST_LINK_STEPS,
+            "duration",
+            scenario.duration,
+            f"up to {longest:g} s for {self.links} links at this physics step",
+        )
+
+    def write(self, scenario: Scenario, row: Array) -> None:
+        """Write a scenario's parameters and its start, straight and at rest, into the rows."""
+        conditions, water, path = scenario.conditions, scenario.water, scenario.path
+        motion, links = scenario.inspection, self.links
+        row[: self._guidance] = body_row(
+            self.robot,
+            self.shared(scenario, None),
+            coefficients=water.coefficients,
+            joint_gains=scenario.joint_gains,
+            filter_frequency=motion.filter_frequency or 0.0,
+            time_constant=conditions.thruster_time_constant,
+        )
+        row[[rows.WATER_X, rows.WATER_Y]] = water.current
+        row[[rows.MEAN_X, rows.MEAN_Y]] = water.current
+        row[[rows.AMPLITUDE_X, rows.AMPLITUDE_Y]] = water.amplitude
+        row[[rows.PHASE_X, rows.PHASE_Y]] = water.phase
+        row[rows.WATER_FREQUENCY] = 2 * np.pi / water.period
+        share = rows.row_of(rows.SHARE, links) + links - 1 - motion.bending_joints
+        row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
+        shifts = len(scenario.shifts)
+        row[rows.SHIFT_TIME : rows.SHIFT_TIME + shifts] = scenario.shifts
+        sizes = np.diff(motion.deflections, prepend=0.0)[:shifts]
+        row[rows.SHIFT_SIZE : rows.SHIFT_SIZE + shifts] = sizes
+        row[rows.LIMIT] = conditions.thruster_limit
+        asked = row[self._guidance :]
+        asked[guidance.SPEED], asked[guidance.SWAY] = path.speed, path.amplitude
+        asked[guidance.FREQUENCY], asked[guidance.RAMP] = path.frequency, path.ramp
+        asked[guidance.LOOK_AHEAD] = scenario.look_ahead or 0.0
+        asked[guidance.CROSS_TRACK] = scenario.cross_track
+        asked[guidance.HEAD_HEADING] = scenario.heading == "head"
+
+    def shared(self, scenario: Scenario, previous: Plant | None) -> Plant:
+        """What all robots share; as many changes of the joint references as any of them has."""
+        shifts, moving = len(scenario.shifts), any(scenario.water.amplitude)
+        if previous is not None:
+            if shifts <= previous.shifts and moving <= previous.moving_water:
+                return previous
+            shifts, moving = max(shifts, previous.shifts), moving or previous.moving_water
+        conditions = scenario.conditions
+        return plant_of(
+            self.robot,
+            conditions.physics_step,
+            substeps=conditions.substeps,
+            implicit=conditions.integrator == "symplectic",
+            hydrodynamics=conditions.hydrodynamics,
+            shifts=shifts,
+            moving_water=moving,
+        )
+
+    def truth(self, read: Callable[[str], Array]) -> dict[str, Array]:
+        """True parameters and signals, in the global frame.
+
+        Returns:
+            `coefficients`, as in `Robot.hydrodynamic_coefficients`, (size, 6); `water_velocity` and
+            `velocity` of the centre of mass, m/s, (size, 2); `disturbance`, its acceleration less
+            that by the thrusters over the mass, f / m_t of (23), m/s^2, (size, 2).
+        """
+        turned = np.where(self.robot.thruster_is_normal, 0.5 * np.pi, 0.0)
+        angle, force = read("theta")[:, self.robot.thruster_links] + turned, read("force")
+        push = np.stack([(force * np.cos(angle)).sum(axis=1), (force * np.sin(angle)).sum(axis=1)])
+        return {
+            "coefficients": read("coefficients"),
+            "water_velocity": read("water_velocity"),
+            "velocity": read("velocity"),
+            "disturbance": read("acceleration") - push.T / self.mass,
+        }
+
+    def allocate(self, observation: NDArray[np.float32], matrices: Array) -> None:
+        """Fill in the allocation matrices of robots as observed; see `World.allocate`."""
+        layout = self.layout
+        allocations(observation, self._nominal, layout.starts, layout.scale, matrices)
+
+    @property
+    def _guidance(self) -> int:
+        """The first row of guidance."""
+        return rows.body_rows(self.links, self.thrusters)
+
+    @cached_property
+    def _nominal(self) -> Plant:
+        return plant_of(self.robot, 0.0)
+
+
+@world_of.register
+@lru_cache
+def _planar_world(robot: Robot) -> PlanarWorld:
+    return PlanarWorld(robot)

@@ -1,0 +1,177 @@
+"""Scenarios by name, and drawn at random: what is asked for in either mode (docs/model.md 9)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from usm_gym.robot import Robot
+from usm_gym.robots import PAPER, name_of, robot_of
+from usm_gym.support.validation import require
+from usm_gym.task.conditions import FIELD, PRESETS, Conditions
+from usm_gym.task.nominal import Nominal
+from usm_gym.task.scenario import STILL, Inspection, Mode, Path, Scenario, draw_water, mode_of
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What is asked of the robot in a mode.
+
+    Attributes:
+        path: The nominal path.
+        speeds: From where to where the speed of a path is drawn, m/s.
+        amplitudes: The same of its amplitude, m.
+        frequencies: The same of its angular frequency, rad/s.
+        look_ahead: As in `Scenario`.
+        bending: Whether the joints bend.
+    """
+
+    path: Path
+    speeds: tuple[float, float]
+    amplitudes: tuple[float, float]
+    frequencies: tuple[float, float]
+    look_ahead: float | None
+    bending: bool
+
+    def draw_path(self, stream: np.random.Generator) -> Path:
+        """Draw a path."""
+        return Path(
+            speed=stream.uniform(*self.speeds),
+            amplitude=stream.uniform(*self.amplitudes),
+            frequency=stream.uniform(*self.frequencies),
+        )
+
+    def draw_motion(
+        self, conditions: Conditions, joints: int, stream: np.random.Generator
+    ) -> Inspection:
+        """Draw the motion of the joints; a third to eleven fifteenths of them bend."""
+        if not self.bending:
+            return STILL
+        bending_joints = int(stream.integers(max(1, joints // 3), most_bending(joints) + 1))
+        side = 1.0 if stream.random() < 0.5 else -1.0
+        first, second = stream.uniform(*conditions.deflection_range, 2)
+        third = stream.uniform(-0.35, 0.35)
+        times = np.array([10.0, 20.0, 30.0]) + stream.uniform(-2.0, 2.0, 3)
+        return Inspection(
+            bending_joints=bending_joints,
+            times=tuple(times.tolist()),
+            deflections=(side * first, -side * second, third),
+            filter_frequency=stream.uniform(*conditions.filter_range),
+        )
+
+
+RECIPES: dict[Mode, Recipe] = {
+    "operation": Recipe(Path(), (0.0, 0.1), (0.0, 0.25), (0.03, 0.15), None, bending=True),
+    "torpedo": Recipe(Path(speed=0.1), (0.05, 0.3), (0.0, 0.5), (0.03, 0.12), 2.24, bending=False),
+}
+
+
+@dataclass(frozen=True)
+class ModeSampler:
+    """Scenarios of a mode, under given conditions, for a given robot.
+
+    Attributes:
+        mode: "operation" or "torpedo".
+        conditions: Their conditions.
+        body: The robot.
+    """
+
+    mode: Mode
+    conditions: Conditions
+    body: Robot
+
+    @property
+    def nominal(self) -> Nominal:
+        """What a controller may know before the first scenario."""
+        return self.choose("nominal").nominal
+
+    def draw(self, stream: np.random.Generator) -> Scenario:
+        """Draw a scenario."""
+        return sample(self.mode, self.conditions, stream, name_of(self.body))
+
+    def choose(self, wanted: str | Mapping[str, Any] | Scenario) -> Scenario:
+        """The scenario of a name, of a dict, or itself; a dict without robot has this one.
+
+        Raises:
+            ValueError: If there is none, or it is of another robot or mode.
+        """
+        if isinstance(wanted, str):
+            return named(wanted, self.mode, self.conditions, name_of(self.body))
+        if not isinstance(wanted, Scenario):
+            known = {"robot": name_of(self.body)}
+            wanted = Scenario.from_dict(known | wanted if isinstance(wanted, dict) else wanted)
+        require(wanted.mode == self.mode, "the scenario's mode", wanted.mode, repr(self.mode))
+        allowed = f"the environment's, {name_of(self.body)}"
+        require(wanted.body == self.body, "the scenario's robot", wanted.robot, allowed)
+        return wanted
+
+
+def sample(
+    mode: Mode,
+    conditions: Conditions,
+    stream: np.random.Generator,
+    robot: str | Robot = PAPER,
+) -> Scenario:
+    """Draw a scenario of a mode.
+
+    Args:
+        mode: "operation" or "torpedo".
+        conditions: Conditions, whose ranges are used.
+        stream: Where all randomness comes from.
+        robot: The robot, or its name.
+    """
+    recipe, joints = RECIPES[mode_of(mode)], robot_of(robot).links - 1
+    path = recipe.draw_path(stream)
+    inspection = recipe.draw_motion(conditions, joints, stream)
+    noise_seed = int(stream.integers(2**63))
+    return dataclasses.replace(
+        named("nominal", mode, conditions, robot),
+        path=path,
+        inspection=inspection,
+        water=draw_water(conditions, noise_seed),
+        noise_seed=noise_seed,
+    )
+
+
+def named(
+    name: str, mode: Mode, conditions: Conditions | None = None, robot: str | Robot = PAPER
+) -> Scenario:
+    """The scenario "nominal" or "table1" of a mode.
+
+    Args:
+        name: "nominal", or "table1", the scenario of the paper's Table 1.
+        mode: "operation" or "torpedo".
+        conditions: Its conditions; without them "field" for nominal and "ideal" for table1.
+        robot: The robot, or its name; eleven fifteenths of its joints bend.
+    """
+    require(name in ("nominal", "table1"), "scenario", name, "nominal, table1")
+    recipe = RECIPES[mode_of(mode)]
+    bending_joints = most_bending(robot_of(robot).links - 1)
+    nominal = Scenario(
+        mode=mode,
+        path=recipe.path,
+        inspection=Inspection(bending_joints=bending_joints) if recipe.bending else STILL,
+        conditions=conditions or FIELD,
+        look_ahead=recipe.look_ahead,
+        robot=robot,
+    )
+    if name == "nominal":
+        return nominal
+    at_once = dataclasses.replace(nominal.inspection, filter_frequency=None)
+    return dataclasses.replace(
+        nominal,
+        path=Path(ramp=0.0),
+        inspection=at_once if recipe.bending else STILL,
+        conditions=conditions or PRESETS["ideal"],
+        joint_stiffness=9000.0,
+        joint_damping=150.0,
+    )
+
+
+def most_bending(joints: int) -> int:
+    """How many of a robot's joints bend at most."""
+    return max(1, 11 * joints // 15)

@@ -1,0 +1,225 @@
+"""The seam between body and task: what a simulation drives, and from what laws are made.
+
+A world joins one body, one task and its sensors. It says in which axes errors are measured and how
+many numbers describe a robot, writes a scenario into these, and has the compiled entry points that
+advance them. `usm_gym.planar_world` is the one of the paper's robot; docs/layout.md says how to add
+another.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from functools import singledispatch
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from usm_gym.sensors import Layout
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.nominal import Nominal
+
+Array = NDArray[np.float64]
+
+
+class Fleet(NamedTuple):
+    """The robots that are simulated side by side, `size` of them in blocks of `lanes`.
+
+    Attributes:
+        blocks: Numbers of all robots, (blocks, rows * lanes); a row is a number of each robot of
+            the block.
+        instant: Control periods since the start, int64, (size,).
+        noise: Measurement errors of the position, m, (size, control instants, axes).
+        settled: Control period from which on errors count, int64, (size,).
+        error: True position errors, m, (size, axes).
+        max_error: Their largest absolute values since settling, m, (size, axes).
+        attitude_error: Attitude errors as known on board, rad, (size, angles).
+        effort: Mean absolute thruster commands, N, (size,).
+        observation: Observations, float32, (size, numbers).
+    """
+
+    blocks: Array
+    instant: NDArray[np.int64]
+    noise: Array
+    settled: NDArray[np.int64]
+    error: Array
+    max_error: Array
+    attitude_error: Array
+    effort: Array
+    observation: NDArray[np.float32]
+
+
+class Kernels(NamedTuple):
+    """The compiled entry points of a world.
+
+    `shared` is what `World.shared` gives, `table` that of the observation, `actions` the commands
+    over the limits, (size, thrusters).
+
+    Attributes:
+        observe: `(fleet, shared, table, index, lanes)`: fill in errors and observation of a robot.
+        run: `(fleet, shared, table, actions, first, last)`: advance the blocks `first` to `last`,
+            this one left out, each of one robot, by a control period.
+        run_lanes: The same for blocks of `lanes.WIDTH` robots.
+        run_threads: `(fleet, shared, table, actions)`: `run_lanes` for all blocks, shared out among
+            threads.
+    """
+
+    observe: Any
+    run: Any
+    run_lanes: Any
+    run_threads: Any
+
+
+class Episode(Protocol):
+    """What a world asks of a scenario, which also has all that is its own."""
+
+    @property
+    def conditions(self) -> Conditions:
+        """Sensors, actuators, timing."""
+
+    @property
+    def body(self) -> Any:
+        """The robot, of which `world_of` gives the world."""
+
+    @property
+    def nominal(self) -> Nominal:
+        """What a controller may know beforehand."""
+
+    @property
+    def duration(self) -> float:
+        """Length of the episode, s."""
+
+    @property
+    def steps(self) -> int:
+        """Control periods in the episode."""
+
+    @property
+    def settle_time(self) -> float:
+        """From when on errors count, s."""
+
+    @property
+    def shifts(self) -> tuple[float, ...]:
+        """When the body is asked to move, s; metrics leave a while after them out."""
+
+    def noise(self) -> Array:
+        """Measurement errors of the position at every control instant, m, (steps + 1, axes)."""
+
+
+class Sampler(Protocol):
+    """Where the scenarios of an environment come from."""
+
+    @property
+    def body(self) -> Any:
+        """The robot of all scenarios, of which `world_of` gives the world."""
+
+    @property
+    def nominal(self) -> Nominal:
+        """What a controller may know before the first scenario."""
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions of the scenarios that are drawn."""
+
+    def draw(self, stream: np.random.Generator) -> Any:
+        """Draw a scenario."""
+
+    def choose(self, wanted: Any) -> Any:
+        """The scenario of a name, of a dict, or itself.
+
+        Raises:
+            ValueError: If there is none, or it is of another robot or another task.
+        """
+
+
+class World(ABC):
+    """One body, one task and its sensors.
+
+    Attributes:
+        axes: Names of the axes of the position error.
+        attitude: Names of the angles of the attitude error; their errors are observed as
+            `ANGLE_error`.
+        kernels: The compiled entry points.
+    """
+
+    axes: ClassVar[tuple[str, ...]]
+    attitude: ClassVar[tuple[str, ...]] = ()
+    kernels: ClassVar[Kernels]
+
+    @property
+    @abstractmethod
+    def layout(self) -> Layout:
+        """The table of the observation."""
+
+    @property
+    @abstractmethod
+    def links(self) -> int:
+        """Rigid bodies of a robot, by which its work is measured."""
+
+    @property
+    @abstractmethod
+    def thrusters(self) -> int:
+        """Thrusters of a robot."""
+
+    @property
+    @abstractmethod
+    def mass(self) -> float:
+        """Mass of a robot as laws take it, kg."""
+
+    @property
+    @abstractmethod
+    def quantities(self) -> Mapping[str, NDArray[np.int64]]:
+        """Rows of the quantities that may be read, by name; `limit`, N, and `command`, N, too."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> int:
+        """Numbers of a robot."""
+
+    def check(self, scenario: Any) -> None:  # noqa: B027 (a world may take all scenarios)
+        """Refuse a scenario that the robot cannot carry out.
+
+        Raises:
+            ValueError: If it cannot.
+        """
+
+    @abstractmethod
+    def write(self, scenario: Any, row: Array) -> None:
+        """Write a scenario and its start into the numbers of a robot, (rows,)."""
+
+    @abstractmethod
+    def shared(self, scenario: Any, previous: Any) -> Any:
+        """What all robots share, as kernels take it: a named tuple.
+
+        Args:
+            scenario: A scenario that starts.
+            previous: What was shared so far, which is returned if it will do; None at first.
+        """
+
+    def truth(self, read: Callable[[str], Array]) -> dict[str, Array]:
+        """What training may be told and no policy: true parameters and signals, by name.
+
+        Args:
+            read: Reads a quantity of all robots, (size, numbers).
+
+        Returns:
+            Arrays whose first axis is the robots; none, unless the world gives some.
+        """
+        return {}
+
+    @abstractmethod
+    def allocate(self, observation: NDArray[np.float32], matrices: Array) -> None:
+        """Fill in the allocation matrices of robots as observed.
+
+        Args:
+            observation: Observations, (batch, numbers).
+            matrices: Where to write: the forces along the axes, N, then the moments about the
+                attitude's angles, N m, that a unit force of each thruster makes,
+                (batch, axes + angles, thrusters).
+        """
+
+
+@singledispatch
+def world_of(robot: Any) -> World:
+    """The world of a robot."""
+    raise TypeError(f"no world is registered for {type(robot).__name__}")
