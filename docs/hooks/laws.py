@@ -1,6 +1,5 @@
 """Adds gains, an episode and scores to every law on the page of the controllers."""
 
-import json
 import re
 from functools import cache
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import figures
 import usm_baselines
 from mkdocs.exceptions import PluginError
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
 from usm_baselines.registry import entry
 from usm_baselines.space import declared
 
@@ -75,22 +75,27 @@ def made(id):
 
 def scores(ids):
     """The rows of policies in the leaderboard."""
-    suites = leaderboard()
+    board = leaderboard()
     lines = [
-        row("x / y, mm", *(f"`{conditions}`" for conditions in SHOWN.values()), "variation, N/s"),
+        row(
+            f"{' / '.join(board.axes)}, mm",
+            *(f"`{conditions}`" for conditions in SHOWN.values()),
+            "variation, N/s",
+        ),
         "|---|" + "---:|" * (len(SHOWN) + 1),
     ]
     for id in ids:
-        rows = [suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(score[f"max_error_{a}"]["mean"]) for a in "xy") for score in rows]
-        lines.append(row(f"`{id}`", *cells, in_figures(rows[0]["thrust_variation"]["mean"])))
+        rows = [board.suites[suite][id] for suite in SHOWN]
+        cells = [" / ".join(mm(error.mean) for error in each.errors.values()) for each in rows]
+        variation = rows[0].metrics["thrust_variation"].mean
+        lines.append(row(f"`{id}`", *cells, in_figures(variation)))
     return "\n".join(lines)
 
 
 @cache
 def leaderboard():
-    """The suites of the leaderboard."""
-    return json.loads(LEADERBOARD.read_text(encoding="utf-8"))["suites"]
+    """The leaderboard of this version."""
+    return LeaderboardResult.read(LEADERBOARD)
 
 
 def row(*cells):

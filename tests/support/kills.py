@@ -29,7 +29,7 @@ import regression  # noqa: F401 (registers a learner)
 from usm_agents.learning import training, validation
 from usm_agents.learning.plan import PLAN, Plan
 from usm_agents.learning.settings import SETTINGS
-from usm_agents.study import dissection, page, plans, scores, trainings
+from usm_agents.study import dissection, plans, scores, trainings
 from usm_baselines import registry
 from usm_baselines.benchmark import tuning
 from usm_baselines.benchmark.leaderboard import MAIN
@@ -71,7 +71,7 @@ def shrink():
         module.unseen = lambda *of, unseen=module.unseen: [brief(each) for each in unseen(*of)]
     plans.RIVALS = ("sta", "zero")
     plans.PLANS["residual-sac"] = replace(plans.PLANS["residual-sac"], interval=8)
-    scores.TRANSFER = page.TRANSFER = {"still": plans.TRANSFER["still"]}
+    scores.TRANSFER = {"still": plans.TRANSFER["still"]}
     dissection.SEGMENT, dissection.LONGEST_SHIFT = 16, 2
     registry._entries["sta"] = replace(registry._entries["sta"], space=SPACE)
     tuning.FIRST_EPISODES = 1

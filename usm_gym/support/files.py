@@ -15,7 +15,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout, lock_descriptor
 
-from usm_gym.support.validation import clipped, require
+from usm_gym.support.validation import UsageError, clipped, require
 
 # The packages read no larger file, bytes.
 LARGEST = 512 * 2**20
@@ -47,6 +47,19 @@ def read_bytes(path: str | Path, largest: int = LARGEST, links: bool = True) -> 
         return file.read(largest)
 
 
+def read_text(path: str | Path) -> str:
+    """Read a file of text in UTF-8.
+
+    Raises:
+        ValueError: If it is none, or no file as `read_bytes` takes it.
+        OSError: If it cannot be read.
+    """
+    try:
+        return read_bytes(path).decode()
+    except UnicodeDecodeError as error:
+        raise UsageError(f"file {path} is no text in UTF-8: {error}") from error
+
+
 def read_json(path: str | Path, links: bool = True) -> Any:
     """Read a file of JSON.
 
@@ -66,9 +79,9 @@ def parse_json(text: str | bytes, name: str) -> Any:
     try:
         return json.loads(text)
     except RecursionError as error:
-        raise ValueError(f"{clipped(name)} is nested too deeply") from error
-    except ValueError as error:
-        raise ValueError(f"{clipped(name)} is no JSON: {clipped(str(error))}") from error
+        raise UsageError(f"{clipped(name)} is nested too deeply") from error
+    except ValueError as error:  # of JSON, Unicode or an integer of too many digits
+        raise UsageError(f"{clipped(name)} is no JSON: {clipped(str(error))}") from error
 
 
 def check_writable(path: str | Path) -> None:

@@ -25,8 +25,13 @@ def provenance(seeds: Any) -> dict[str, Any]:
         "commit": _commit(),
         "packages": {"python": platform.python_version(), **packages},
         "seeds": seeds,
-        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "command": _text(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])),
     }
+
+
+def _text(argument: str) -> str:
+    """An argument as text: bytes that are none, which a shell can pass, are written as escapes."""
+    return argument.encode(errors="backslashreplace").decode()
 
 
 def _version(package: str) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 
 def figures(value: float) -> str:
@@ -14,3 +15,9 @@ def figures(value: float) -> str:
 def mm(metres: float) -> str:
     """Write a length in mm with three significant figures."""
     return figures(1e3 * metres)
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words as a sentence lists them: "x", "x and y", "x, y and z"."""
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last

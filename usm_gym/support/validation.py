@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import numpy as np
@@ -29,8 +30,31 @@ _repr.maxlevel = 3
 _repr.maxstring = _repr.maxother = _repr.maxlong = QUOTED
 
 
+class UsageError(ValueError):
+    """What a user can mend: an argument, an option or a file is not as it has to be.
+
+    The `usm` command answers with one line. Other exceptions, `OSError` aside, are bugs of ours.
+    """
+
+
+@contextmanager
+def explaining(what: str) -> Iterator[None]:
+    """Put what an input is taken for before the reason why it is refused.
+
+    Args:
+        what: For instance "mine.json is no file of gains".
+
+    Raises:
+        UsageError: If the input is refused inside.
+    """
+    try:
+        yield
+    except (UsageError, ValidationError) as error:
+        raise UsageError(f"{what}: {in_one_line(error)}") from error
+
+
 def require(condition: object, name: str, value: object, allowed: str) -> None:
-    """Raise a `ValueError` that names the argument, its value and what is allowed.
+    """Raise a `UsageError` that names the argument, its value and what is allowed.
 
     Args:
         condition: Whether the value is acceptable.
@@ -39,10 +63,10 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
         allowed: The values that are allowed, in words.
 
     Raises:
-        ValueError: If the condition does not hold.
+        UsageError: If the condition does not hold.
     """
     if not condition:
-        raise ValueError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
+        raise UsageError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
 
 
 def is_whole(value: object, low: int, high: int | None = None) -> bool:
@@ -61,7 +85,7 @@ def real_array(name: str, value: object, allowed: str = "real numbers") -> NDArr
     try:
         array = np.asarray(value)
     except Exception as error:  # a foreign object may raise anything
-        raise ValueError(f"{name} is {brief(value)}; allowed: {allowed}") from error
+        raise UsageError(f"{name} is {brief(value)}; allowed: {allowed}") from error
     require(array.dtype.kind in "biuf", name, value, allowed)
     return array
 
@@ -70,7 +94,7 @@ def real_array(name: str, value: object, allowed: str = "real numbers") -> NDArr
 def validated(cls: type[T]) -> type[T]:
     """Make a frozen dataclass whose fields are validated.
 
-    A wrong field raises a `ValueError` of one line, where pydantic's own error has many.
+    A wrong field raises a `UsageError` of one line, where pydantic's own error has many.
     """
     made: Any = dataclass(frozen=True, config=CONFIG)(cls)
     init = made.__init__
@@ -80,7 +104,7 @@ def validated(cls: type[T]) -> type[T]:
         try:
             init(self, *arguments, **fields)
         except ValidationError as error:
-            raise ValueError(in_one_line(error)) from error
+            raise UsageError(in_one_line(error)) from error
 
     made.__init__ = checked
     known: type[T] = made
@@ -103,12 +127,12 @@ def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dic
     try:
         known = dict(fields)
     except Exception as error:  # a foreign mapping may raise anything
-        raise ValueError(f"{name} is {brief(fields)}; allowed: {allowed}") from error
+        raise UsageError(f"{name} is {brief(fields)}; allowed: {allowed}") from error
     require(all(isinstance(field, str) for field in known), name, fields, allowed)
     try:
         return adapter.validate_python(known)
     except ValidationError as error:
-        raise ValueError(in_one_line(error)) from error
+        raise UsageError(in_one_line(error)) from error
 
 
 def brief(value: object) -> str:
