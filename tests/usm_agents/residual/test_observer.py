@@ -68,7 +68,7 @@ def expected(residual, memory, observation, estimator_state, start, last):
 @pytest.mark.parametrize("robot", [Robot(), SMALL, LONG], ids=["paper", "small", "long"])
 @pytest.mark.parametrize("base", ["sta", "lqg-joints", "zero"])
 def test_every_entry_of_the_table_is_filled_in_to_the_bit(base, robot):
-    nominal = named("nominal", "operation").nominal
+    nominal = named("nominal", "operation", robot=robot).nominal
     residual = Residual(nominal, base, omit=("heading",), frames=2)
     layout = residual.layout
     plain = ObservationLayout(robot.links, len(robot.thrusters))
