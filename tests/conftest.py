@@ -1,4 +1,5 @@
 import os
+import sys
 from datetime import timedelta
 from importlib import import_module, util
 
@@ -12,6 +13,13 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of the tests appear
 settings.register_profile("short", max_examples=25, deadline=None, derandomize=True)
 settings.register_profile("long", max_examples=2000, deadline=timedelta(seconds=10))
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "short"))
+
+
+def pytest_collection_modifyitems(items):
+    if sys.platform == "win32":
+        for item in items:
+            if item.get_closest_marker("posix"):
+                item.add_marker(pytest.mark.skip(reason="Windows lacks what the test needs"))
 
 
 @pytest.fixture

@@ -37,8 +37,9 @@ SHORTER_PYTHON = {
 # What CI does itself, what would change the reader's machine, and what no option makes short.
 LEFT_OUT = (
     "python3 -m venv",
-    "python -m venv",
+    "python -m ",
     "source ",
+    "git ",
     ".venv/bin/",
     "pip install",
     "pre-commit",

@@ -1,1 +1,1 @@
-"""The `usm` command, as it is started."""
+"""The `usm` command."""

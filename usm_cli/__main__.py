@@ -1,4 +1,4 @@
-"""`python -m usm_cli` is the `usm` command."""
+"""Runs the `usm` command as `python -m usm_cli`."""
 
 from usm_cli.main import main
 

@@ -1,4 +1,4 @@
-"""Policies at work, side by side: as a film in a file or in a window (needs the extra `render`)."""
+"""Shows policies side by side, as a film or in a window (needs the extra `render`)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from usm_gym.rendering.canvas import Canvas, Frame, error_scale
 from usm_gym.rendering.window import Window
 from usm_gym.support.files import replacing
 
-# It warns of films that Ctrl-C has ended before their first frame; they are removed anyway.
+# It warns of films that Ctrl-C ends before their first frame, but those are removed anyway.
 logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
 
-# Frames per second of each medium, and how wide a policy's frame is: alone, and beside another.
-# A GIF's times are multiples of 0.01 s, and it grows fast.
+# Frames per second of a medium, and the width of a policy's frame, alone and beside another one.
+# The times of a GIF are multiples of 0.01 s, and GIFs become large quickly.
 FPS = {".mp4": 25.0, ".gif": 12.5, "window": 50.0}
 WIDTHS = {".mp4": (960, 640), ".gif": (640, 480), "window": (960, 640)}
-# A GIF has one palette, so that a frame holds only what differs from the one before. It is made of
-# a few frames that are sent ahead, lest the encoder keep the whole film to find its colours.
+# A GIF has one palette, so that a frame holds only its differences from the one before. The palette
+# comes from a few frames that are sent ahead; otherwise the encoder would keep the whole film.
 AHEAD = 8
 GIF = (
     f"split[a][b];[a]trim=end_frame={AHEAD},palettegen=max_colors=64[p];"
@@ -35,18 +35,18 @@ GIF = (
 
 
 class Film:
-    """Takes of the same scenario side by side, their errors to the same scale.
+    """Takes of the same scenario side by side, with one scale for their errors.
 
     Attributes:
         size: Width and height of a frame.
-        length: How many frames there are.
+        length: Number of frames.
     """
 
     def __init__(self, takes: Sequence[Take], length: int, width: int) -> None:
-        """Cut a film of `length` frames, each take `width` pixels wide."""
+        """Cut a film of `length` frames, in which a take is `width` pixels wide."""
         self._takes = takes
         self._canvases = [Canvas(width) for _ in takes]
-        self._scale = max(error_scale(each.pictures[-1].errors) for each in takes)
+        self._scale = max(error_scale(take.pictures[-1].errors) for take in takes)
         height = self._canvases[0].size[1]
         self.size = (width * len(takes), height)
         self.length = length
@@ -54,8 +54,8 @@ class Film:
     def frame(self, index: int) -> Frame:
         """Draw a frame."""
         drawn = [
-            canvas.draw(each.pictures[min(index, len(each.pictures) - 1)], each.name, self._scale)
-            for canvas, each in zip(self._canvases, self._takes, strict=True)
+            canvas.draw(take.pictures[min(index, len(take.pictures) - 1)], take.name, self._scale)
+            for canvas, take in zip(self._canvases, self._takes, strict=True)
         ]
         return drawn[0] if len(drawn) == 1 else np.concatenate(drawn, axis=1)
 
@@ -90,7 +90,7 @@ def write(
                 for index in range(film.length):
                     writer.send(film.frame(index))
                     progress(1)
-            # The encoder reports nothing, so that a full disk is found by looking.
+            # The encoder does not report a full disk, so count the frames.
             written, _ = imageio_ffmpeg.count_frames_and_secs(part)
         except (OSError, RuntimeError) as error:
             raise OSError(f"cannot write {path}: the encoder stopped; is the disk full?") from error
@@ -99,9 +99,9 @@ def write(
 
 
 def play(film: Film, fps: float) -> None:
-    """Show a film in a window, leaving out what comes too late, until its end or a closed window.
+    """Show a film in a window until it ends or the window is closed, and skip late frames.
 
-    Escape and Q close it, too.
+    Escape and Q also close the window.
     """
     window = Window(film.size, "usm watch")
     begin = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The console script `usm`: Ctrl-C ends a command with status 130 and one line."""
+"""Starts and ends the console script `usm`; Ctrl-C ends it with one line and status 130."""
 
 import os
 import signal
@@ -31,19 +31,19 @@ def main() -> None:
 
 
 def open_closed_streams() -> None:
-    """Put the null device where `>&-` has closed a standard stream.
+    """Open the null device in place of a standard stream that `>&-` has closed.
 
-    Otherwise the next file to be opened would take the stream's place.
+    Otherwise the next file that is opened would take the place of the stream.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
-            handle = os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            handle = os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
             os.set_inheritable(handle, True)
             setattr(sys, name, os.fdopen(handle, "w" if number else "r"))
 
 
 def drop_unwritable_output() -> None:
-    """Let the interpreter end in silence if nobody takes what it still has to print."""
+    """Let the interpreter end silently if nobody reads the rest of its output."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -14,7 +14,7 @@ from typing import Any
 import joblib
 
 from usm_gym.support.files import check_writable, parse_json
-from usm_gym.support.validation import require
+from usm_gym.support.validation import UsageError, require
 from usm_gym.task.conditions import Conditions, conditions_of
 
 # How long a cluster may take to accept a connection, s.
@@ -32,12 +32,12 @@ def check_installed(what: str, extra: str, *modules: str) -> None:
         modules: Names under which the modules are imported.
 
     Raises:
-        ValueError: If one is not there.
+        UsageError: If one is not there.
     """
     for module in modules:
         if find_spec(module) is None:
             package = module.replace("_", "-")
-            raise ValueError(f"{what} needs {package}: pip install 'usm-gym[{extra}]'")
+            raise UsageError(f"{what} needs {package}: pip install 'usm-gym[{extra}]'")
 
 
 def add_computing(parser: argparse.ArgumentParser) -> None:
@@ -83,10 +83,11 @@ def check_reachable(address: str) -> None:
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon:
         return  # a word that Ray knows, such as "auto"
-    require(port.isdigit(), "--cluster", address, "HOST:PORT")
+    known = port.isdecimal() and len(port) <= 5 and int(port) < 2**16
+    require(known, "--cluster", address, "HOST:PORT")
     try:
         socket.create_connection((host, int(port)), CONNECTION_TIME).close()
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # the latter of a host that cannot be a name
         raise ConnectionError(f"no Ray cluster at {address}: {error}") from error
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Any
@@ -22,7 +23,7 @@ from usm_cli.commands import (
     watch,
 )
 from usm_cli.terminal import Parser
-from usm_gym.support.validation import in_one_line
+from usm_gym.support.validation import UsageError, in_one_line
 
 COMMANDS = (
     policies,
@@ -58,21 +59,35 @@ A first look:
 """
 
 
+BUG = "usm: this is a bug in usm-gym; please report it with the lines above"
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a command and leave with its status: 2 for bad input or output that cannot be written."""
+    """Run a command and leave with its status.
+
+    It is 2 for bad input and for output that cannot be written, and 1 for a bug of ours.
+    """
     status: Any = None
+    debug = False
     try:
         try:
             chosen = parser().parse_args(arguments)
+            debug = chosen.debug
             chosen.run(chosen)
         except SystemExit as left:
             status = left.code
         sys.stdout.flush()
     except BrokenPipeError:
         status = 1  # the reader has gone, and knows
-    except (ValueError, OSError) as error:
+    except (UsageError, OSError) as error:
+        if debug:
+            traceback.print_exc()
         print(f"usm: error: {in_one_line(error)}", file=sys.stderr)
         status = 2
+    except Exception:
+        traceback.print_exc()
+        print(BUG, file=sys.stderr)
+        status = 1
     if status:
         sys.exit(status)
 
@@ -81,6 +96,9 @@ def parser() -> Parser:
     """The parser of all commands."""
     parser = Parser(prog="usm", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
+    parser.add_argument(
+        "--debug", action="store_true", help="show where in the code an error was found"
+    )
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:
         command.add_to(subparsers)

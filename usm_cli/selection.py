@@ -11,8 +11,8 @@ from typing import Any
 from usm_agents.policies import named
 from usm_baselines.benchmark.scoring import (
     TIME_LIMIT,
+    Job,
     Refusal,
-    Task,
     score_all,
     shared_nominal,
 )
@@ -25,7 +25,7 @@ from usm_gym.evaluation import BATCH, Evaluation
 from usm_gym.robot import Robot
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json
-from usm_gym.support.validation import in_one_line, require
+from usm_gym.support.validation import explaining, require
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.scenario import MODES, Mode, Scenario
 
@@ -138,59 +138,56 @@ def read_suite(name: str) -> list[Scenario]:
     """The scenarios of a frozen suite, or of a JSON file that holds a list of them."""
     if not name.endswith(".json"):
         return suite(name)
-    try:
-        listed = read_json(name)["scenarios"]
+    with explaining(f"{name} is no file of scenarios"):
+        document = read_json(name)
+        listed: Any = document.get("scenarios") if isinstance(document, dict) else None
         require(isinstance(listed, list) and listed, "scenarios", listed, "a list of one or more")
-    except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{name} is no file of scenarios: {in_one_line(error)}") from error
     scenarios = []
     for index, data in enumerate(listed):
-        try:
+        with explaining(f"{name}, scenario {index}"):
             scenarios.append(Scenario.from_dict(data))
-        except ValueError as error:
-            raise ValueError(f"{name}, scenario {index}: {in_one_line(error)}") from error
     return scenarios
 
 
-def tasks(
+def jobs(
     contenders: Iterable[Contender], scenarios: Sequence[Scenario], time_limit: float
-) -> list[Task]:
-    """One task for each policy, all on the same scenarios.
+) -> list[Job]:
+    """One job for each policy, all on the same scenarios.
 
     Raises:
         ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
     """
     robot = Robot()
     nominal = shared_nominal(robot, scenarios)
-    found = []
+    listed = []
     for each in contenders:
         each.make(nominal)
-        found.append(Task(each, tuple(scenarios), nominal, robot, time_limit))
-    return found
+        listed.append(Job(each, tuple(scenarios), nominal, robot, time_limit))
+    return listed
 
 
 def scored(
-    chosen: Sequence[Task], arguments: argparse.Namespace, cache: Path | None = None
+    chosen: Sequence[Job], arguments: argparse.Namespace, cache: Path | None = None
 ) -> list[Evaluation | Refusal]:
-    """Score tasks on what the options say, with a progress bar."""
+    """Score policies on what the options say, with a progress bar."""
     with computing(arguments) as workers, progress_bar() as bar:
-        total = sum(len(task.scenarios) for task in chosen)
+        total = sum(len(job.scenarios) for job in chosen)
         line = bar.add_task("episodes", total=total)
         return score_all(chosen, workers, cache, lambda episodes: bar.advance(line, episodes))
 
 
 def by_name(
-    chosen: Sequence[Task], outcomes: Sequence[Evaluation | Refusal]
+    chosen: Sequence[Job], outcomes: Sequence[Evaluation | Refusal]
 ) -> tuple[dict[str, Evaluation], dict[str, str]]:
-    """The scores of tasks by the name of the policy, and why the others have none."""
-    found: dict[str, Evaluation] = {}
+    """The scores of jobs by the name of the policy, and why the others have none."""
+    scores: dict[str, Evaluation] = {}
     refused: dict[str, str] = {}
-    for task, outcome in zip(chosen, outcomes, strict=True):
+    for job, outcome in zip(chosen, outcomes, strict=True):
         if isinstance(outcome, Refusal):
-            refused[task.contender.name] = outcome.reason
+            refused[job.contender.name] = outcome.reason
         else:
-            found[task.contender.name] = outcome
-    return found, refused
+            scores[job.contender.name] = outcome
+    return scores, refused
 
 
 def leave_if_refused(refused: Mapping[str, str]) -> None:

@@ -8,10 +8,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -22,7 +22,9 @@ from usm_gym.evaluation import evaluate
 from usm_gym.robot import Robot, Thruster
 from usm_gym.simulation import Simulation
 from usm_gym.suites import suite
+from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.seeding import EVALUATION, stream
+from usm_gym.support.validation import Count, Number, require, validated
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import Path as Track
@@ -40,8 +42,8 @@ env.step(env.action_space.sample())
 
 
 @dataclass(frozen=True)
-class Task:
-    """Something to time.
+class Timing:
+    """A piece of work to be timed.
 
     Attributes:
         name: Key of its figure.
@@ -56,7 +58,7 @@ class Task:
     scale: float = 1e9
 
 
-@dataclass(frozen=True)
+@validated
 class Figure:
     """A measured figure.
 
@@ -66,35 +68,97 @@ class Figure:
         high: Largest.
     """
 
-    median: float
-    low: float
-    high: float
+    median: Number
+    low: Number
+    high: Number
+
+
+@validated
+class Growth:
+    """The cost of a physics step at some size.
+
+    Attributes:
+        links: Links of a robot.
+        robots: Robots side by side.
+        threads: Threads.
+        ns: Cost for each robot and step, ns.
+    """
+
+    links: Count
+    robots: Count
+    threads: Count
+    ns: Number
+
+
+@validated
+class Machine:
+    """The machine that figures are of.
+
+    Attributes:
+        processor: Its processor.
+        cores: How many cores it has, where that is known.
+        system: Its operating system.
+    """
+
+    processor: str
+    cores: int | None
+    system: str
+
+
+@validated
+class SpeedResult(Part, Result):
+    """The figures of `usm bench`.
+
+    Attributes:
+        medians: Median of each figure; in JSON they stand beside the other fields.
+        spread: Each figure with its spread.
+        missing: Figures that need a package which is not installed.
+        growth: Costs for more links, robots and threads, if they were asked for.
+        machine: The machine.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "bench"
+    marked: ClassVar[bool] = False
+    beside: ClassVar[str] = "medians"
+    medians: Mapping[str, Number]
+    spread: Mapping[str, Figure]
+    missing: tuple[str, ...]
+    growth: tuple[Growth, ...]
+    machine: Machine
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        """Refuse medians of other figures."""
+        names = list(self.spread)
+        require(list(self.medians) == names, "medians", list(self.medians), ", ".join(names))
 
 
 def summarise(values: Any) -> Figure:
     """Median and spread of one figure's rounds."""
-    return Figure(*(float(each) for each in (np.median(values), np.min(values), np.max(values))))
+    low, high = float(np.min(values)), float(np.max(values))
+    return Figure(median=float(np.median(values)), low=low, high=high)
 
 
 def interleaved(
-    tasks: list[Task], rounds: int, progress: Callable[[], object]
+    timings: list[Timing], rounds: int, progress: Callable[[], object]
 ) -> dict[str, list[float]]:
-    """Time all tasks once per round, after one run each that is not counted."""
-    for task in tasks:
-        task.run()
-    times: dict[str, list[float]] = {task.name: [] for task in tasks}
+    """Time everything once per round, after one run each that is not counted."""
+    for timing in timings:
+        timing.run()
+    times: dict[str, list[float]] = {timing.name: [] for timing in timings}
     for _ in range(rounds):
-        for task in tasks:
+        for timing in timings:
             begin = time.perf_counter()
-            task.run()
-            times[task.name].append((time.perf_counter() - begin) / task.units * task.scale)
+            timing.run()
+            times[timing.name].append((time.perf_counter() - begin) / timing.units * timing.scale)
         progress()
     return times
 
 
-def plant_task(
+def plant_timing(
     name: str, size: int, period: float, threads: int = 1, robot: Robot | None = None
-) -> Task:
+) -> Timing:
     """Physics steps of `size` robots, per robot and step, with the joints moving.
 
     Without thrust they have to keep near a reference that rests, or they would be lost.
@@ -110,7 +174,7 @@ def plant_task(
             simulation.restore(start)
         simulation.step(action)
 
-    return Task(name, run, size * conditions.substeps)
+    return Timing(name, run, size * conditions.substeps)
 
 
 def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
@@ -125,10 +189,10 @@ def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
     return [scenarios[i % len(scenarios)] for i in range(size)]
 
 
-def vector_task(name: str, size: int, steps: int, threads: int = 1) -> Task:
+def vector_timing(name: str, size: int, steps: int, threads: int = 1) -> Timing:
     """Whole steps of the vector environment, per robot, within episodes.
 
-    Starts of episodes are timed by `start_task`: how many there are depends on the policy.
+    Starts of episodes are timed by `start_timing`: how many there are depends on the policy.
     """
     envs = gym.make_vec(
         "usm_gym:USM-Operation-v0",
@@ -140,33 +204,33 @@ def vector_task(name: str, size: int, steps: int, threads: int = 1) -> Task:
     return _loop(name, envs, steps, size, options)
 
 
-def start_task(name: str, size: int) -> Task:
+def start_timing(name: str, size: int) -> Timing:
     """Starts of episodes in the vector environment: draw, noise, first observation; us."""
     envs = gym.make_vec(
         "usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point"
     )
     envs.reset(seed=0)
-    return Task(name, envs.reset, size, 1e6)
+    return Timing(name, envs.reset, size, 1e6)
 
 
-def sync_task(name: str, size: int, steps: int) -> Task:
+def sync_timing(name: str, size: int, steps: int) -> Timing:
     """The same through Gymnasium's `SyncVectorEnv` of single environments."""
     envs = gym.make_vec("usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="sync")
     return _loop(name, envs, steps, size)
 
 
-def cartpole_task(name: str, size: int, steps: int) -> Task:
+def cartpole_timing(name: str, size: int, steps: int) -> Timing:
     """Gymnasium's CartPole vector environment, per robot."""
     envs = gym.make_vec("CartPole-v1", num_envs=size, vectorization_mode="vector_entry_point")
     return _loop(name, envs, steps, size)
 
 
-def swimmer_task(name: str, steps: int) -> Task:
+def swimmer_timing(name: str, steps: int) -> Timing:
     """Gymnasium's Swimmer-v5; raises `ImportError` or a Gymnasium error without MuJoCo."""
     return _loop(name, gym.make("Swimmer-v5"), steps, 1)
 
 
-def mujoco_task(name: str, steps: int) -> Task:
+def mujoco_timing(name: str, steps: int) -> Timing:
     """MuJoCo's C loop, Euler, on the same chain with ellipsoid fluid; `ImportError` without it."""
     import mujoco
     from mujoco import rollout
@@ -177,7 +241,7 @@ def mujoco_task(name: str, steps: int) -> Task:
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.zeros((1, mujoco.mj_stateSize(model, kind)))
     mujoco.mj_getState(model, data, state[0], kind)
-    return Task(name, lambda: rollout.rollout(model, data, state, nstep=steps), steps)
+    return Timing(name, lambda: rollout.rollout(model, data, state, nstep=steps), steps)
 
 
 def mujoco_chain(robot: Robot) -> str:
@@ -202,7 +266,7 @@ def mujoco_chain(robot: Robot) -> str:
 
 def _loop(
     name: str, env: Any, steps: int, size: int, options: dict[str, Any] | None = None
-) -> Task:
+) -> Timing:
     env.reset(seed=0, options=options)
     env.action_space.seed(0)
     single = isinstance(env, gym.Env)
@@ -216,7 +280,7 @@ def _loop(
             if single and (outcome[2] or outcome[3]):
                 env.reset()
 
-    return Task(name, run, size * steps)
+    return Timing(name, run, size * steps)
 
 
 def paper_rate() -> None:
@@ -256,17 +320,17 @@ def first_step(compile_anew: bool) -> float:
         return time.perf_counter() - begin
 
 
-def growth(rounds: int) -> Iterator[dict[str, float]]:
+def growth(rounds: int) -> Iterator[Growth]:
     """Cost per robot and physics step, ns, for more links, more robots, more threads."""
     for links in (4, 8, 16, 32, 64):
         body = growing_robot(links)
         for name, size, period in (("single", 1, SINGLE_PERIOD), ("batch", ROBOTS, BATCH_PERIOD)):
-            figure = _alone(plant_task(name, size, period, robot=body), rounds)
-            yield {"links": links, "robots": size, "threads": 1, "ns": figure}
+            figure = _alone(plant_timing(name, size, period, robot=body), rounds)
+            yield Growth(links=links, robots=size, threads=1, ns=figure)
     for size in (1, 8, 64, 512, 4096):
         for threads in (1, 2):
-            figure = _alone(plant_task("batch", size, 0.02, threads), rounds)
-            yield {"links": 16, "robots": size, "threads": threads, "ns": figure}
+            figure = _alone(plant_timing("batch", size, 0.02, threads), rounds)
+            yield Growth(links=16, robots=size, threads=threads, ns=figure)
 
 
 def growing_robot(links: int) -> Robot:
@@ -276,12 +340,12 @@ def growing_robot(links: int) -> Robot:
     return Robot(links=links, thrusters=(Thruster(1, "axial"), *normal))
 
 
-def _alone(task: Task, rounds: int) -> float:
-    return summarise(interleaved([task], rounds, lambda: None)[task.name]).median
+def _alone(timing: Timing, rounds: int) -> float:
+    return summarise(interleaved([timing], rounds, lambda: None)[timing.name]).median
 
 
-def machine() -> dict[str, Any]:
-    """The machine that the figures are of."""
+def machine() -> Machine:
+    """This machine."""
     model = platform.processor() or platform.machine()
     information = Path("/proc/cpuinfo")
     if information.exists():
@@ -289,4 +353,4 @@ def machine() -> dict[str, Any]:
             if line.startswith("model name"):
                 model = line.split(":", 1)[1].strip()
                 break
-    return {"processor": model, "cores": os.cpu_count(), "system": platform.platform()}
+    return Machine(processor=model, cores=os.cpu_count(), system=platform.platform())

@@ -11,7 +11,7 @@ from usm_baselines.contender import Contender
 from usm_gym.evaluation import Trajectory, rollout
 from usm_gym.rendering.picture import Picture, Recorder
 from usm_gym.simulation import Simulation
-from usm_gym.support.validation import in_one_line
+from usm_gym.support.validation import UsageError, in_one_line
 from usm_gym.task.scenario import Scenario
 
 
@@ -73,7 +73,7 @@ def take(
         (trajectory,) = rollout(policy, [scenario], progress, watch)
     except (Exception, SystemExit) as error:  # whatever a controller may do
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-        raise ValueError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
+        raise UsageError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
     end = max(seen)
     pictures = [seen[count] for count in shown if count < end] + [seen[end]]
     return Take(contender.name, pictures, trajectory)

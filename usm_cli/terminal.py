@@ -1,4 +1,4 @@
-"""What the commands share on the terminal: errors in one line, tables, progress."""
+"""Writes on the terminal: errors in one line, tables, progress."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from usm_gym.support.validation import SAID, clipped
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that keeps the lines of its texts and says what is wrong in one."""
+    """An argument parser that keeps the lines of its texts and reports an error in one line."""
 
     def __init__(self, **options: Any) -> None:
         """Take the options of `argparse.ArgumentParser`."""
@@ -30,12 +30,12 @@ class Parser(argparse.ArgumentParser):
 
 
 def output_console() -> Console:
-    """Where results go: the terminal, or a pipe that gets full width."""
+    """The console for results: the terminal, or a pipe with full width."""
     return Console() if sys.stdout.isatty() else Console(width=160, highlight=False)
 
 
 def progress_bar() -> Progress:
-    """A progress bar on standard error, shown on a terminal only."""
+    """A progress bar on standard error, which only a terminal shows."""
     console = Console(stderr=True)
     return Progress(
         TextColumn("{task.description}"),
@@ -50,7 +50,7 @@ def progress_bar() -> Progress:
 
 
 def empty_table(*words: str, numbers: Iterable[str] = (), title: str | None = None) -> Table:
-    """A table without rows: columns of words, then columns of numbers, which are aligned right."""
+    """A table without rows, with columns of words, then right-aligned columns of numbers."""
     table = Table(
         *words, title=title, title_justify="left", title_style="", box=SIMPLE_HEAD, pad_edge=False
     )

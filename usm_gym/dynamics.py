@@ -11,7 +11,7 @@ from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout
 from usm_gym.plant.chain import Plant, accelerate_all
 from usm_gym.robot import Hydrodynamics, Robot
-from usm_gym.support.validation import brief, real_array, require
+from usm_gym.support.validation import UsageError, brief, real_array, require
 
 Array = NDArray[np.float64]
 
@@ -124,6 +124,6 @@ def _broadcast(given: dict[str, Array]) -> tuple[tuple[int, ...], list[Array]]:
     except ValueError:
         leading = {name: shape for name, shape in shapes.items() if shape}
         allowed = "shapes that NumPy broadcasts"
-        raise ValueError(f"the leading axes are {brief(leading)}; allowed: {allowed}") from None
+        raise UsageError(f"the leading axes are {brief(leading)}; allowed: {allowed}") from None
     whole = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in given.values()]
     return batch, [array.reshape(-1, array.shape[-1]) for array in whole]

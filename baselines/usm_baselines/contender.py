@@ -26,7 +26,7 @@ from typing import Any
 from usm_baselines.gains import read_gains
 from usm_baselines.registry import Entry, entry, tuned
 from usm_gym.policy import Policy
-from usm_gym.support.validation import in_one_line, require
+from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.nominal import Nominal
 
 PREDICT = "predict(observation, state=None, episode_start=None, deterministic=True)"
@@ -59,15 +59,15 @@ class Contender:
             policy: Policy = self.factory(nominal)
         except Exception as error:
             fault = f"{type(error).__name__}: {in_one_line(error)}"
-            raise ValueError(f"policy {self.name} cannot be made: {fault}") from error
+            raise UsageError(f"policy {self.name} cannot be made: {fault}") from error
         predict = getattr(policy, "predict", None)
         require(
             callable(predict), f"policy {self.name}", type(policy).__name__, f"one with {PREDICT}"
         )
         try:
             inspect.signature(policy.predict).bind(None, None, None, deterministic=True)
-        except TypeError as error:
-            raise ValueError(f"policy {self.name} lacks {PREDICT}: {error}") from error
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"policy {self.name} lacks {PREDICT}: {error}") from error
         return policy
 
 
@@ -117,7 +117,7 @@ def own(name: str) -> Callable[[Nominal], Any]:
         module = importlib.import_module(path)
     except Exception as error:
         fault = f"{type(error).__name__}: {in_one_line(error)}"
-        raise ValueError(f"policy {name}: module {path!r} cannot be imported ({fault})") from error
+        raise UsageError(f"policy {name}: module {path!r} cannot be imported ({fault})") from error
     factory: Any = getattr(module, attribute, None)
     require(
         callable(factory),

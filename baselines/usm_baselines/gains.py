@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field, TypeAdapter
 
 from usm_gym.support.files import read_json
-from usm_gym.support.validation import Count, Number, in_one_line
+from usm_gym.support.validation import Count, Number, explaining
 
 # Of any law, in its own unit.
 Gain = Annotated[Number, Field(ge=-1e12, le=1e12)]
@@ -60,7 +60,5 @@ def read_gains(path: str | Path) -> GainsFile:
         ValueError: If it is none.
         OSError: If it cannot be read.
     """
-    try:
+    with explaining(f"{path} is no file of gains"):
         return _ADAPTER.validate_python(read_json(path))
-    except ValueError as error:
-        raise ValueError(f"{path} is no file of gains: {in_one_line(error)}") from error

@@ -7,6 +7,7 @@ Stable-Baselines3's recurrent policies.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ class ScriptedPolicy:
     Gains: type[Any]
     # Names of the numbers that the law keeps for each axis, in order.
     state: tuple[str, ...] = ()
-    # Those among them that tell more than the observation does: estimates, adapted gains.
+    # Those among them that the residual task shows to its agent.
     shown: tuple[str, ...] = ()
     # Whether the law computes with the inertia, drag or plant of the planar robot.
     planar = False
@@ -76,7 +77,7 @@ class ScriptedPolicy:
         """The law's own numbers in what `predict` returns, by name, each (batch, axes)."""
         return {name: state[:, column] for name, column in self.columns.items()}
 
-    @property
+    @cached_property
     def law_shape(self) -> tuple[int, ...]:
         """Shape of all that the law keeps of one robot, the numbers of `state` first."""
         return (self._model.axes, len(self.state))

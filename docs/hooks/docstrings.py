@@ -1,4 +1,4 @@
-"""Docstrings as Python sees them, where a class completes its own on import."""
+"""Takes docstrings from Python where a class completes its own on import."""
 
 import importlib
 import inspect
@@ -12,5 +12,5 @@ class RuntimeDocstrings(griffe.Extension):
     def on_class(self, *, cls, **_):
         """Replace such a docstring."""
         if cls.docstring and "OBSERVATION_TABLE" in cls.docstring.value:
-            found = getattr(importlib.import_module(cls.module.path), cls.name)
-            cls.docstring.value = inspect.getdoc(found)
+            runtime = getattr(importlib.import_module(cls.module.path), cls.name)
+            cls.docstring.value = inspect.getdoc(runtime)

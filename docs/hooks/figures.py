@@ -1,4 +1,4 @@
-"""Figures that are drawn anew each time the site is built, from episodes that are run for them."""
+"""Runs episodes and draws their figures whenever the site is built."""
 
 import io
 from functools import cache

@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers draw without a script."""
+"""Writes formulas as MathML, which browsers draw without a script."""
 
 import re
 from html import unescape
@@ -13,7 +13,7 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>',
 
 def on_page_content(html, **_):
     """Draw the formulas of a page."""
-    return FORMULA.sub(lambda found: formula(unescape(found[2]), found[1] == "div"), html)
+    return FORMULA.sub(lambda match: formula(unescape(match[2]), match[1] == "div"), html)
 
 
 def formula(latex, block):
@@ -22,7 +22,7 @@ def formula(latex, block):
     for ours, theirs in DIALECT.items():
         known = known.replace(ours, theirs)
     drawn = convert(known, display="block" if block else "inline")
-    # What latex2mathml does not know it hands on as it is.
+    # latex2mathml passes on what it does not know.
     if "\\" in drawn or "<mi>&</mi>" in drawn:
         raise PluginError(f"formula is {latex}; allowed: what latex2mathml knows")
     return drawn

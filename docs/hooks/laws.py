@@ -1,6 +1,5 @@
-"""What the page of the controllers shows of each law: gains, an episode, scores."""
+"""Adds gains, an episode and scores to every law on the page of the controllers."""
 
-import json
 import re
 from functools import cache
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import figures
 import usm_baselines
 from mkdocs.exceptions import PluginError
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
 from usm_baselines.registry import entry
 from usm_baselines.space import declared
 
@@ -25,7 +25,7 @@ def on_page_markdown(markdown, **_):
     """Put laws in their places."""
     laws = [ids.split(", ") for ids in PLACE.findall(markdown)]
     everyone = [id for ids in laws for id in shipped(ids)]
-    return PLACE.sub(lambda found: law(found[1].split(", "), everyone), markdown)
+    return PLACE.sub(lambda match: law(match[1].split(", "), everyone), markdown)
 
 
 def law(ids, everyone):
@@ -34,7 +34,7 @@ def law(ids, everyone):
     others = [id for id in everyone if id not in shown]
     names = ", ".join(f"<code>{id}</code>" for id in shown)
     caption = (
-        "Position error in the first episode of the operation suite, largest in each half second: "
+        "Position error in the first episode of the operation suite, largest in every half second: "
         f"{names}; grey: the other laws of this page; dotted: when the joints start to move."
     )
     figure = f"<figure>{figures.errors(shown, others)}<figcaption>{caption}</figcaption></figure>"
@@ -42,7 +42,7 @@ def law(ids, everyone):
 
 
 def shipped(ids):
-    """Policies, each followed by its tuned form if there is one."""
+    """Policies, followed by their tuned form if there is one."""
     known = usm_baselines.ids()
     for id in ids:
         if id not in known:
@@ -75,22 +75,27 @@ def made(id):
 
 def scores(ids):
     """The rows of policies in the leaderboard."""
-    suites = leaderboard()
+    board = leaderboard()
     lines = [
-        row("x / y, mm", *(f"`{conditions}`" for conditions in SHOWN.values()), "variation, N/s"),
+        row(
+            f"{' / '.join(board.axes)}, mm",
+            *(f"`{conditions}`" for conditions in SHOWN.values()),
+            "variation, N/s",
+        ),
         "|---|" + "---:|" * (len(SHOWN) + 1),
     ]
     for id in ids:
-        rows = [suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(each[f"max_error_{a}"]["mean"]) for a in "xy") for each in rows]
-        lines.append(row(f"`{id}`", *cells, in_figures(rows[0]["thrust_variation"]["mean"])))
+        rows = [board.suites[suite][id] for suite in SHOWN]
+        cells = [" / ".join(mm(error.mean) for error in each.errors.values()) for each in rows]
+        variation = rows[0].metrics["thrust_variation"].mean
+        lines.append(row(f"`{id}`", *cells, in_figures(variation)))
     return "\n".join(lines)
 
 
 @cache
 def leaderboard():
-    """The suites of the leaderboard."""
-    return json.loads(LEADERBOARD.read_text(encoding="utf-8"))["suites"]
+    """The leaderboard of this version."""
+    return LeaderboardResult.read(LEADERBOARD)
 
 
 def row(*cells):

@@ -1,4 +1,4 @@
-"""What the site takes from the rest of the repository: pages, results, notebooks, speed."""
+"""Adds pages, results, notebooks and speed from the rest of the repository to the site."""
 
 import json
 from pathlib import Path
@@ -7,6 +7,7 @@ from mkdocs.structure.files import File
 
 import usm_gym
 from usm_cli.commands.bench import MEANINGS
+from usm_cli.speed import SpeedResult
 from usm_gym.support.text import figures
 
 ROOT = Path(__file__).parents[2]
@@ -49,14 +50,14 @@ def speed(path):
     """The figures of `usm bench` as a table, with the command and the machine."""
     if not path.exists():
         return "No measurement has been published with this version."
-    found = json.loads(path.read_text(encoding="utf-8"))
+    result = SpeedResult.read(path)
     lines = ["| what | median | smallest | largest |", "|---|---:|---:|---:|"]
     for name, meaning in MEANINGS.items():
-        if name in found["spread"]:
-            spread = found["spread"][name]
-            numbers = " | ".join(figures(spread[key]) for key in ("median", "low", "high"))
+        if name in result.spread:
+            spread = result.spread[name]
+            numbers = " | ".join(map(figures, (spread.median, spread.low, spread.high)))
             lines.append(f"| {meaning} | {numbers} |")
-    machine, source = found["machine"], found["provenance"]
-    where = f"{machine['processor']}, {machine['cores']} cores, {machine['system']}"
-    by = f"By `{source['command']}`, commit {source['commit']}, on {where}."
+    machine, source = result.machine, result.provenance
+    where = f"{machine.processor}, {machine.cores} cores, {machine.system}"
+    by = f"By `{source.command}`, commit {source.commit}, on {where}."
     return "\n".join([by, "", *lines])

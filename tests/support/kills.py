@@ -25,11 +25,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import regression  # registers a learner
+import regression  # noqa: F401 (registers a learner)
 from usm_agents.learning import training, validation
 from usm_agents.learning.plan import PLAN, Plan
 from usm_agents.learning.settings import SETTINGS
-from usm_agents.study import dissection, page, plans, scores, trainings
+from usm_agents.study import dissection, plans, scores, trainings
 from usm_baselines import registry
 from usm_baselines.benchmark import tuning
 from usm_baselines.benchmark.leaderboard import MAIN
@@ -37,7 +37,6 @@ from usm_baselines.space import Range
 
 from usm_cli.commands import leaderboard
 from usm_cli.program import main
-from usm_gym.envs.usm import USMVectorEnv
 from usm_gym.suites import suite
 from usm_gym.task.scenario import STILL
 
@@ -62,7 +61,6 @@ def brief(scenario):
 def shrink():
     """Make all commands small, in this process."""
     os.fsync = lambda handle: None  # a kill is no power cut
-    USMVectorEnv.truth = regression.stub_truth
     SETTINGS["sac"] |= {"robots": 4, "learning_starts": 4, "batch_size": 8, "buffer_size": 100}
     training.train = partial(training.train, validation_episodes=2, test_episodes=2)
     trainings.train = training.train
@@ -73,7 +71,7 @@ def shrink():
         module.unseen = lambda *of, unseen=module.unseen: [brief(each) for each in unseen(*of)]
     plans.RIVALS = ("sta", "zero")
     plans.PLANS["residual-sac"] = replace(plans.PLANS["residual-sac"], interval=8)
-    scores.TRANSFER = page.TRANSFER = {"still": plans.TRANSFER["still"]}
+    scores.TRANSFER = {"still": plans.TRANSFER["still"]}
     dissection.SEGMENT, dissection.LONGEST_SHIFT = 16, 2
     registry._entries["sta"] = replace(registry._entries["sta"], space=SPACE)
     tuning.FIRST_EPISODES = 1

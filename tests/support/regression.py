@@ -67,8 +67,4 @@ class Regression:
         self._setup.envs.restore(robots)
 
 
-def stub_truth(envs):
-    return {"disturbance": -0.5 * envs.simulation.error}
-
-
 register("regression", Regression, SETTINGS)

@@ -12,7 +12,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 from support import oracle
-from usm_baselines import policy as policy_module
+from support.ball import BallScenario
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
@@ -213,11 +213,9 @@ def test_laws_do_not_know_how_many_axes_there_are(id: str) -> None:
 
 
 @pytest.mark.parametrize("id", ["lqg", "lqg-joints", "mpc", "oracle"])
-def test_laws_of_the_planar_robot_refuse_others(id: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    model_of = policy_module.model_of
-    monkeypatch.setattr(policy_module, "model_of", lambda known: model_of(known)._replace(axes=3))
-    with pytest.raises(ValueError, match="axes is 3; allowed: 2, of the planar robot"):
-        made(id)
+def test_laws_of_the_planar_robot_refuse_others(id: str) -> None:
+    with pytest.raises(ValueError, match=r"robot is Ball\(.*\); allowed: the planar robot"):
+        usm_baselines.make(id, BallScenario().nominal)
 
 
 def angles(observation: NDArray[np.float32]) -> Array:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from support.interrupts import listening
 
+from usm_cli.commands import policies
 from usm_cli.program import main
 
 USM = Path(sys.executable).with_name("usm")
@@ -186,6 +187,7 @@ class Waiting:
 """
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 def test_ctrl_c_leaves_with_status_130_and_no_file(tmp_path):
     (tmp_path / "mine.py").write_text(WAITING)
@@ -248,6 +250,34 @@ def test_a_closed_pipe_leaves_no_traceback():
         f"{USM} policies | true", shell=True, capture_output=True, text=True, check=False
     )
     assert answer.stderr == ""
+
+
+def test_a_bug_is_a_traceback_and_status_1(monkeypatch, capsys):
+    def slip(arguments):
+        raise ValueError("a slip of ours")
+
+    monkeypatch.setattr(policies, "run", slip)
+    with pytest.raises(SystemExit) as left:
+        main(["policies"])
+    assert left.value.code == 1
+    *lines, last = capsys.readouterr().err.splitlines()
+    assert lines[0] == "Traceback (most recent call last):"
+    assert lines[-1] == "ValueError: a slip of ours"
+    assert last == "usm: this is a bug in usm-gym; please report it with the lines above"
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--policies", "nobody"), ("--suite", "missing.json")], ids=["input", "file"]
+)
+def test_debug_shows_where_an_error_was_found(arguments, monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    line = refused(capsys, "evaluate", *arguments)
+    with pytest.raises(SystemExit) as left:
+        main(["--debug", "evaluate", *arguments])
+    assert left.value.code == 2
+    errors = capsys.readouterr().err
+    assert errors.startswith("Traceback (most recent call last):\n")
+    assert errors.endswith(line)
 
 
 def test_reproduce_refuses_a_folder_that_cannot_be_made(tmp_path, capsys):

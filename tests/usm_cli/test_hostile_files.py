@@ -20,7 +20,7 @@ from usm_cli.report import chapters
 from usm_cli.selection import read_suite
 from usm_gym.simulation import Simulation
 from usm_gym.support.files import write_json
-from usm_gym.support.validation import QUOTED, SAID, in_one_line
+from usm_gym.support.validation import QUOTED, SAID, UsageError, in_one_line
 
 # The same folder serves all examples, each of which writes its files anew.
 anew = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -33,7 +33,7 @@ def refused(call, *arguments):
     """Whether a call refuses what it is given, shortly, on one line."""
     try:
         call(*arguments)
-    except (ValueError, OSError) as error:
+    except (UsageError, OSError) as error:
         text = in_one_line(error)
         assert "\n" not in text
         assert len(text) <= LINE
@@ -143,7 +143,8 @@ def test_a_hostile_result_in_a_report(tmp_path, result, data):
     (tmp_path / "result.json").write_text(as_json(document))
 
     def report():
-        made = chapters.chapter(tmp_path / "result.json", chapters.Choice(), lambda *_: None)
+        result = chapters.read(tmp_path / "result.json")
+        made = chapters.chapter(result, chapters.Choice(), lambda *_: None)
         html([made], provenance({}))
 
     refused(report)
@@ -195,7 +196,7 @@ def lines(draw):
 @given(words=lines())
 def test_a_hostile_command_line(tmp_path, monkeypatch, capsys, words):
     def never(*_):
-        raise ValueError("nothing is computed here")
+        raise UsageError("nothing is computed here")
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Simulation, "step", never)

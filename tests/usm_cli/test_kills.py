@@ -11,6 +11,7 @@ pytest.importorskip("optuna", reason="the extra `tune` is not installed")
 KILLS = Path(__file__).parents[1] / "support" / "kills.py"
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",

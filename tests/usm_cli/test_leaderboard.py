@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.episodes import short
+from support.results import evaluation
 from usm_baselines import gains, registry
 from usm_baselines.benchmark import leaderboard as board
 from usm_baselines.benchmark import leaderboard_page
@@ -81,7 +82,8 @@ def test_the_leaderboard_is_the_same_with_one_and_two_workers(
     page = (folder / "page.md").read_text()
     assert page.startswith("before\n<!-- leaderboard -->\n| policy |")
     assert page.endswith("after\n")
-    assert page[7:-6] == leaderboard_page.readme_block(documents[0])
+    result = board.LeaderboardResult.read(folder / "1" / "leaderboard.json")
+    assert page[7:-6] == leaderboard_page.readme_block(result)
     for figure in ("errors", "profiles", "variation"):
         assert (folder / "1" / f"{figure}.png").stat().st_size > 10_000
     capsys.readouterr()
@@ -122,8 +124,8 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
     fronts = board.front()
     made: list[Any] = [each.make(nominal) for each in fronts["mine"]]
     assert [each.gains.k_p for each in made] == [0.001, 0.01]
-    cells = board.cells([], fronts, SUITES)
-    assert [cell.suite for cell in cells] == [board.MAIN] * 2
+    places = board.places([], fronts, SUITES)
+    assert [place.suite for place in places] == [board.MAIN] * 2
 
 
 def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
@@ -143,8 +145,9 @@ def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
     ]
     rows = board.ranked(pairs)
     assert list(rows) == ["sta", "pd", "seer"]
-    assert rows["sta"]["beats_next"]["decided"]
-    assert "beats_next" not in rows["pd"]
+    assert rows["sta"].beats_next is not None
+    assert rows["sta"].beats_next.decided
+    assert rows["pd"].beats_next is None
     table = leaderboard_page.table(rows)
     assert "| seer (no competitor) |" in table
     assert "| yes (1.00) |" in table
@@ -174,7 +177,7 @@ def test_readme_and_results_show_the_tables_of_the_leaderboard() -> None:
     made = ROOT / "results" / version("usm-gym") / "leaderboard.json"
     if not made.exists():
         pytest.skip("there is no leaderboard of this version yet")
-    found = read(made)
+    found = board.LeaderboardResult.read(made)
     assert made.with_suffix(".md").read_text(encoding="utf-8") == leaderboard_page.markdown(found)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert readme.count(leaderboard_page.MARKS[0]) == 1
@@ -224,7 +227,7 @@ def test_compare_draws_no_conclusion_from_few_episodes(
         (["compare", "zero", "zero"], "another than A"),
         (["compare", "zero", "nobody"], "nobody"),
         (["compare", "zero", "missing.json"], "missing.json"),
-        (["compare", "zero", "suite.json"], "no file of results"),
+        (["compare", "zero", "suite.json"], "suite.json is no complete evaluation: kind is None"),
         (["compare", "results.json", "zero"], "results.json:zero, results.json:pd"),
         (["compare", "results.json:sta", "zero"], "results.json:zero, results.json:pd"),
         (["compare", "results.json:pd", "zero", "--seed", "1"], "--seed"),
@@ -242,10 +245,9 @@ def test_compare_draws_no_conclusion_from_few_episodes(
 def test_bad_input_gets_one_line_and_status_2(
     folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
 ) -> None:
-    rows = {id: {"per_episode": {f"max_error_{a}": [1.0] for a in "xy"}} for id in ("zero", "pd")}
     for name, seed in (("results", 0), ("others", 1)):
-        scenarios = [each.to_dict() for each in short(1, seed=seed)]
-        (folder / f"{name}.json").write_text(json.dumps({"scenarios": scenarios, "results": rows}))
+        scenarios = tuple(short(1, seed=seed))
+        evaluation("xy", ("zero", "pd"), scenarios).write(folder / f"{name}.json")
     suite_file(folder / "suite.json", 1)
     with pytest.raises(SystemExit) as left:
         main(arguments)

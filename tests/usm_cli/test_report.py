@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from usm_baselines.paper.reproduction import PAPER
+from usm_baselines.paper.reproduction import PAPER, ReproductionResult, declaration
 
 import usm_gym
 from usm_cli.program import main
@@ -17,6 +17,7 @@ from usm_cli.report import chapters, page, plots
 from usm_cli.report.replay import packed
 from usm_gym.rendering import canvas as rendering
 from usm_gym.support.provenance import provenance
+from usm_gym.support.results import Provenance
 
 ROOT = Path(__file__).parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -200,7 +201,10 @@ def test_code_that_a_file_names_is_not_run(folder, tmp_path, monkeypatch):
         ("nothing", "is no JSON"),
         ("[1]", "kind of result.json is None; allowed: evaluation, leaderboard"),
         ('{"kind": "poem"}', "kind of result.json is 'poem'; allowed"),
-        ('{"kind": "evaluation", "suite": null}', "is no complete evaluation: KeyError"),
+        (
+            '{"kind": "evaluation", "suite": null}',
+            "result.json is no complete evaluation: conditions is missing",
+        ),
     ],
 )
 def test_what_is_no_result_gets_one_line(tmp_path, monkeypatch, capsys, content, message):
@@ -270,13 +274,19 @@ def test_who_is_beaten():
     assert [plots.beaten(each, points) for each in points] == [False, False, True]
 
 
-def test_a_reproduction_has_a_page(tmp_path):
-    document = {"kind": "reproduction", "step": 2e-4, "rows": PAPER, "paper": PAPER}
-    path = tmp_path / "table1.json"
-    path.write_text(json.dumps(document | {"provenance": provenance({})}))
+def test_a_reproduction_has_a_page():
+    result = ReproductionResult(
+        step=2e-4,
+        settle_time=5.0,
+        rows=PAPER,
+        thrust_effort={},
+        paper=PAPER,
+        scenario=declaration(),
+        provenance=Provenance.here({}),
+    )
     done = []
     choice = chapters.Choice()
-    made = chapters.chapter(path, choice, lambda *numbers: done.append(numbers))
+    made = chapters.chapter(result, choice, lambda *numbers: done.append(numbers))
     assert done[-1] == (5, 5)
     replay = made.blocks[1]
     assert set(replay.data["episodes"]) >= {"sta", "pd"}

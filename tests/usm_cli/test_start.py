@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.interrupts import listening
 
-pytestmark = pytest.mark.slow  # one process or more for every test
+pytestmark = [pytest.mark.posix, pytest.mark.slow]  # one process or more for every test
 
 USM = Path(sys.executable).with_name("usm")
 # Interrupts the process group, as a terminal does, at the first import of a module: deterministic,

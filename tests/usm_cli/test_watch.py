@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -226,7 +225,10 @@ def test_a_film_is_whole_whatever_becomes_of_the_scores(
     assert len(probe(output)[1]) == 13
 
 
+@pytest.mark.posix
 def test_a_full_disk_leaves_one_line_and_no_file(output):
+    import resource  # which Windows lacks
+
     taken = take(contender("sta"), SHORT, instants(SHORT, 25.0, 1.0))
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
@@ -239,6 +241,7 @@ def test_a_full_disk_leaves_one_line_and_no_file(output):
     assert list(output.parent.iterdir()) == []
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 def test_ctrl_c_leaves_with_status_130_and_no_file(output):
     arguments = ["watch", "--seed", "1", "--speed", "0.01", "--output", output]

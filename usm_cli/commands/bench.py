@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 
 import gymnasium as gym
 from rich.table import Table
 
 from usm_cli import speed as benchmark
-from usm_cli.speed import BATCH_PERIOD, ROBOTS, SINGLE_PERIOD, Figure, Task, summarise
+from usm_cli.speed import (
+    BATCH_PERIOD,
+    ROBOTS,
+    SINGLE_PERIOD,
+    Figure,
+    Growth,
+    SpeedResult,
+    Timing,
+    summarise,
+)
 from usm_cli.terminal import empty_table, output_console, progress_bar
-from usm_gym.support.files import check_writable, write_json
-from usm_gym.support.provenance import provenance
+from usm_gym.support.files import check_writable
+from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Measure speed on this machine, each figure against its peer in the same run: the tasks take turns,
-round by round, and medians with smallest and largest value are printed. Peers that are not
+Measure speed on this machine, each figure against its peer in the same run: they take turns, round
+by round, and medians with smallest and largest value are printed. Peers that are not
 installed (the extra `bench`) are said to be missing. Takes two minutes; let the machine do nothing
 else meanwhile.
 """
@@ -76,11 +84,11 @@ def run(arguments: argparse.Namespace) -> None:
     require(1 <= rounds <= 10_000, "--rounds", rounds, "1 to 10000")
     if arguments.output:
         check_writable(arguments.output)
-    tasks, missing = available()
+    timings, missing = available()
     seconds = whole_jobs()
     with progress_bar() as bar:
         total = bar.add_task("rounds", total=rounds + len(seconds))
-        times = benchmark.interleaved(tasks, rounds, lambda: bar.advance(total))
+        times = benchmark.interleaved(timings, rounds, lambda: bar.advance(total))
         for name, (job, repeats) in seconds.items():
             bar.update(total, description=name)
             times[name] = [job() for _ in range(repeats)]
@@ -96,37 +104,39 @@ def run(arguments: argparse.Namespace) -> None:
     if rows:
         console.print(growth_table(rows))
     if arguments.output:
-        document = {
-            **{name: figure.median for name, figure in measured.items()},
-            "spread": {name: asdict(figure) for name, figure in measured.items()},
-            "missing": missing,
-            "growth": rows,
-            "machine": benchmark.machine(),
-            "provenance": provenance({"rounds": rounds}),
-        }
-        write_json(arguments.output, document)
+        result = SpeedResult(
+            medians={name: figure.median for name, figure in measured.items()},
+            spread=measured,
+            missing=tuple(missing),
+            growth=tuple(rows),
+            machine=benchmark.machine(),
+            provenance=Provenance.here({"rounds": rounds}),
+        )
+        result.write(arguments.output)
 
 
-def available() -> tuple[list[Task], list[str]]:
-    """Tasks that can be run here, and the names of those that lack a package."""
-    makers: dict[str, Callable[[str], Task]] = {
-        "plant_step_ns": lambda name: benchmark.plant_task(name, 1, SINGLE_PERIOD),
-        "batch_step_ns": lambda name: benchmark.plant_task(name, ROBOTS, BATCH_PERIOD),
-        "mujoco_step_ns": lambda name: benchmark.mujoco_task(name, 2000),
-        "vector_env_step_ns": lambda name: benchmark.vector_task(name, ROBOTS, 100),
-        "vector_env_two_threads_step_ns": lambda name: benchmark.vector_task(name, ROBOTS, 100, 2),
-        "sync_vector_env_step_ns": lambda name: benchmark.sync_task(name, 8, 50),
-        "episode_start_us": lambda name: benchmark.start_task(name, 64),
-        "swimmer_v5_step_ns": lambda name: benchmark.swimmer_task(name, 500),
-        "cartpole_vector_env_step_ns": lambda name: benchmark.cartpole_task(name, ROBOTS, 200),
+def available() -> tuple[list[Timing], list[str]]:
+    """What can be timed here, and the names of what lacks a package."""
+    makers: dict[str, Callable[[str], Timing]] = {
+        "plant_step_ns": lambda name: benchmark.plant_timing(name, 1, SINGLE_PERIOD),
+        "batch_step_ns": lambda name: benchmark.plant_timing(name, ROBOTS, BATCH_PERIOD),
+        "mujoco_step_ns": lambda name: benchmark.mujoco_timing(name, 2000),
+        "vector_env_step_ns": lambda name: benchmark.vector_timing(name, ROBOTS, 100),
+        "vector_env_two_threads_step_ns": lambda name: benchmark.vector_timing(
+            name, ROBOTS, 100, 2
+        ),
+        "sync_vector_env_step_ns": lambda name: benchmark.sync_timing(name, 8, 50),
+        "episode_start_us": lambda name: benchmark.start_timing(name, 64),
+        "swimmer_v5_step_ns": lambda name: benchmark.swimmer_timing(name, 500),
+        "cartpole_vector_env_step_ns": lambda name: benchmark.cartpole_timing(name, ROBOTS, 200),
     }
-    tasks, missing = [], []
+    timings, missing = [], []
     for name, maker in makers.items():
         try:
-            tasks.append(maker(name))
+            timings.append(maker(name))
         except (ImportError, gym.error.Error):
             missing.append(name)
-    return tasks, missing
+    return timings, missing
 
 
 def whole_jobs() -> dict[str, tuple[Callable[[], float], int]]:
@@ -153,11 +163,11 @@ def table(measured: dict[str, Figure], missing: list[str]) -> Table:
     return rows
 
 
-def growth_table(rows: list[dict[str, float]]) -> Table:
+def growth_table(rows: list[Growth]) -> Table:
     """How the cost grows."""
     headings = ("links", "robots", "threads", "ns per robot and step", "ns per link")
     table = empty_table(numbers=headings)
     for row in rows:
-        counts = [str(row[key]) for key in ("links", "robots", "threads")]
-        table.add_row(*counts, figures(row["ns"]), figures(row["ns"] / row["links"]))
+        counts = [str(each) for each in (row.links, row.robots, row.threads)]
+        table.add_row(*counts, figures(row.ns), figures(row.ns / row.links))
     return table

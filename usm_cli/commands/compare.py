@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from usm_agents.policies import named
+from usm_baselines.benchmark.results import ComparisonResult, Difference, EvaluationResult
 
 from usm_cli.selection import (
     POLICIES,
@@ -15,18 +16,20 @@ from usm_cli.selection import (
     add_scoring,
     by_name,
     chosen_scenarios,
+    jobs,
     leave_if_refused,
     scored,
     seeds,
-    tasks,
 )
 from usm_cli.terminal import output_console
-from usm_gym.statistics import Comparison, compare
-from usm_gym.support.files import check_writable, read_json, write_json
-from usm_gym.support.provenance import provenance
+from usm_gym.statistics import compare
+from usm_gym.support.files import check_writable
+from usm_gym.support.results import Provenance
 from usm_gym.support.text import mm
-from usm_gym.support.validation import in_one_line, require
+from usm_gym.support.validation import require
+from usm_gym.task.metrics import MAX_ERROR, axes_of
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import OtherScenario
 
 DESCRIPTION = """\
 Compare two policies episode by episode, on the same scenarios and noise. Printed are the mean
@@ -42,20 +45,19 @@ examples:
   usm compare results.json:sta results.json:pd      nothing is evaluated
   usm compare results.json:sta my_module:Mine       evaluated on the scenarios of the file
 """
-SCORES = ("max_error_x", "max_error_y")
-Scores = Mapping[str, list[float]]
+Scores = Mapping[str, Sequence[float]]
 
 
 @dataclass(frozen=True)
-class Results:
+class PolicyScores:
     """A policy's part of a file of results.
 
     Attributes:
         scenarios: The file's scenarios.
-        scores: The scores per episode.
+        scores: The largest errors of each episode, by metric.
     """
 
-    scenarios: list[Scenario]
+    scenarios: list[Scenario | OtherScenario]
     scores: Scores
 
 
@@ -82,37 +84,45 @@ def run(arguments: argparse.Namespace) -> None:
     names = (arguments.first, arguments.second)
     require(names[0] != names[1], "B", names[1], "another than A")
     files = {name: read_results(name) for name in names if is_results(name)}
-    scenarios = chosen_scenarios(arguments)
-    if files:
-        options = ("suite", "seed", "episodes", "mode", "conditions")
-        given = [f"--{name}" for name in options if getattr(arguments, name) is not None]
-        require(not given, " ".join(given), names, "policies only: a file has its own scenarios")
-        scenarios, *others = [each.scenarios for each in files.values()]
-        require(all(other == scenarios for other in others), "B", names[1], "the scenarios of A")
     missing = [named(name) for name in names if name not in files]
-    chosen = tasks(missing, scenarios, arguments.time_limit) if missing else []
-    scores: dict[str, Scores] = {name: each.scores for name, each in files.items()}
-    found, refused = by_name(chosen, scored(chosen, arguments))
+    scenarios: Sequence[Scenario | OtherScenario]
+    scenarios = common_scenarios(arguments, names, files) if files else chosen_scenarios(arguments)
+    planar = [each for each in scenarios if isinstance(each, Scenario)]
+    known = not missing or len(planar) == len(scenarios)
+    require(known, "policies", names, "two results, as these scenarios are of another world")
+    chosen = jobs(missing, planar, arguments.time_limit) if missing else []
+    scores = {name: each.scores for name, each in files.items()}
+    evaluated, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
-    for name, evaluation in found.items():
-        scores[name] = {key: evaluation.per_episode[key].tolist() for key in SCORES}
+    scores |= {name: errors_of(each.per_episode) for name, each in evaluated.items()}
     first, second = (scores[name] for name in names)
-    comparisons = {name: compare(first[name], second[name]) for name in SCORES}
+    require(list(first) == list(second), "B", names[1], "a policy on the axes of A")
+    compared = {name: compare(first[name], second[name]) for name in first}
+    result = ComparisonResult(
+        first=names[0],
+        second=names[1],
+        episodes=len(scenarios),
+        comparisons={name: Difference.of(each, *names) for name, each in compared.items()},
+        provenance=Provenance.here({"files": list(files)} if files else seeds(arguments)),
+    )
     console = output_console()
-    for name, comparison in comparisons.items():
-        console.print(sentence(name[-1], comparison, *names), markup=False, soft_wrap=True)
+    for axis, name in zip(axes_of(compared), compared, strict=True):
+        said = sentence(axis, result.comparisons[name], *names)
+        console.print(said, markup=False, soft_wrap=True)
     if arguments.output:
-        document = {
-            "first": names[0],
-            "second": names[1],
-            "episodes": len(scenarios),
-            "comparisons": {
-                name: {**asdict(each), "decided": each.decided, "verdict": each.verdict(*names)}
-                for name, each in comparisons.items()
-            },
-            "provenance": provenance({"files": list(files)} if files else seeds(arguments)),
-        }
-        write_json(arguments.output, document)
+        result.write(arguments.output)
+
+
+def common_scenarios(
+    arguments: argparse.Namespace, names: Sequence[str], files: Mapping[str, PolicyScores]
+) -> list[Scenario | OtherScenario]:
+    """The scenarios of files, which have to be the same."""
+    options = ("suite", "seed", "episodes", "mode", "conditions")
+    given = [f"--{name}" for name in options if getattr(arguments, name) is not None]
+    require(not given, " ".join(given), names, "policies only: a file has its own scenarios")
+    scenarios, *others = [each.scenarios for each in files.values()]
+    require(all(other == scenarios for other in others), "B", names[1], "the scenarios of A")
+    return scenarios
 
 
 def is_results(name: str) -> bool:
@@ -120,32 +130,31 @@ def is_results(name: str) -> bool:
     return "@" not in name and name.partition(":")[0].endswith(".json")
 
 
-def read_results(name: str) -> Results:
+def read_results(name: str) -> PolicyScores:
     """Read FILE.json or FILE.json:POLICY, as `usm evaluate` has written it."""
     path, _, policy = name.partition(":")
-    try:
-        document = read_json(path)
-        results: dict[str, Any] = document["results"]
-        scenarios = [Scenario.from_dict(each) for each in document["scenarios"]]
-        scores = {
-            id: {key: row["per_episode"][key] for key in SCORES} for id, row in results.items()
-        }
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"{path} is no file of results: {in_one_line(error)}") from error
-    several = ", ".join(f"{path}:{id}" for id in results)
-    require(policy or len(results) == 1, "results", name, several)
-    require(not policy or policy in results, "results", name, several)
-    return Results(scenarios, scores[policy or next(iter(results))])
+    result = EvaluationResult.read(path)
+    several = ", ".join(f"{path}:{id}" for id in result.results) or "a file with scores"
+    require(
+        policy in result.results if policy else len(result.results) == 1, "results", name, several
+    )
+    scores = result.results[policy or next(iter(result.results))]
+    return PolicyScores(list(result.scenarios), errors_of(scores.per_episode))
 
 
-def sentence(axis: str, comparison: Comparison, first: str, second: str) -> str:
-    """A comparison in words."""
-    low, high = comparison.difference_ci95
-    least, most = comparison.improvement_ci95
+def errors_of(per_episode: Mapping[str, Any]) -> Scores:
+    """The largest error of each episode in each axis, by metric."""
+    return {MAX_ERROR + axis: per_episode[MAX_ERROR + axis] for axis in axes_of(per_episode)}
+
+
+def sentence(axis: str, difference: Difference, first: str, second: str) -> str:
+    """A difference in words."""
+    low, high = difference.difference_ci95
+    least, most = difference.improvement_ci95
     return (
-        f"{axis}: {first} {mm(comparison.first)} mm, {second} {mm(comparison.second)} mm, "
-        f"difference {mm(comparison.difference)} [{mm(low)}, {mm(high)}] mm over "
-        f"{comparison.episodes} episodes; {second} does better with probability "
-        f"{comparison.improvement:.2f} [{least:.2f}, {most:.2f}]: "
-        f"{comparison.verdict(first, second)}."
+        f"{axis}: {first} {mm(difference.first)} mm, {second} {mm(difference.second)} mm, "
+        f"difference {mm(difference.difference)} [{mm(low)}, {mm(high)}] mm over "
+        f"{difference.episodes} episodes; {second} does better with probability "
+        f"{difference.improvement:.2f} [{least:.2f}, {most:.2f}]: "
+        f"{difference.verdict}."
     )

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from rich.table import Table
+from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult
 
 from usm_cli.selection import (
     POLICIES,
@@ -15,15 +16,15 @@ from usm_cli.selection import (
     by_name,
     chosen_contenders,
     chosen_scenarios,
+    jobs,
     leave_if_refused,
     scored,
     seeds,
     suite_name,
-    tasks,
 )
 from usm_cli.terminal import empty_table, output_console
-from usm_gym.support.files import check_writable, write_json
-from usm_gym.support.provenance import provenance
+from usm_gym.support.files import check_writable
+from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures, mm
 
 DESCRIPTION = """\
@@ -66,49 +67,44 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output:
         check_writable(arguments.output)
     scenarios = chosen_scenarios(arguments)
-    chosen = tasks(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
-    found, refused = by_name(chosen, scored(chosen, arguments))
-    privileged = {task.contender.name for task in chosen if task.contender.privileged}
-    results = {
-        name: evaluation.summary() | {"competitor": name not in privileged}
-        for name, evaluation in found.items()
-    }
-    name = suite_name(arguments)
-    if results:
-        output_console().print(table(results, f"{name or 'sampled'}, {len(scenarios)} episodes"))
+    chosen = jobs(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
+    scores, refused = by_name(chosen, scored(chosen, arguments))
+    privileged = {job.contender.name for job in chosen if job.contender.privileged}
+    result = EvaluationResult(
+        suite=suite_name(arguments),
+        conditions=scenarios[0].conditions,
+        conditions_override=arguments.conditions,
+        settle_time=scenarios[0].settle_time,
+        episodes=len(scenarios),
+        scenarios=tuple(scenarios),
+        results={
+            name: CompetitorScores.of(each.summary(), competitor=name not in privileged)
+            for name, each in scores.items()
+        },
+        refused=refused,
+        provenance=Provenance.here(seeds(arguments)),
+    )
+    if result.results:
+        output_console().print(table(result))
     if arguments.output:
-        document = {
-            "kind": "evaluation",
-            "suite": name,
-            "conditions": scenarios[0].to_dict()["conditions"],
-            "conditions_override": arguments.conditions,
-            "settle_time": scenarios[0].settle_time,
-            "episodes": len(scenarios),
-            "scenarios": [scenario.to_dict() for scenario in scenarios],
-            "results": results,
-            "refused": refused,
-            "provenance": provenance(seeds(arguments)),
-        }
-        write_json(arguments.output, document)
+        result.write(arguments.output)
     leave_if_refused(refused)
 
 
-def table(results: dict[str, Any], title: str) -> Table:
+def table(result: EvaluationResult) -> Table:
     """The scores for the terminal, errors in mm."""
-    errors = ("x", "y", "worst x", "worst y", "settled x", "settled y")
+    axes = result.axes
+    headings = [prefix + axis for prefix in ("", "worst ", "settled ") for axis in axes]
+    where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
     rows = empty_table(
         "policy",
-        numbers=(*errors, "thrust\nN", "variation\nN/s", "lost"),
-        title=f"largest position error after settling, mm: mean [95 % interval] ({title})",
+        numbers=(*headings, "thrust\nN", "variation\nN/s", "lost"),
+        title=f"largest position error after settling, mm: mean [95 % interval] ({where})",
     )
-    for name, row in results.items():
-        cells = []
-        for axis in "xy":
-            score = row[f"max_error_{axis}"]
-            low, high = score["ci95"]
-            cells.append(f"{mm(score['mean'])} [{mm(low)}, {mm(high)}]")
-        cells += [mm(row[f"max_error_{axis}"]["worst"]) for axis in "xy"]
-        cells += [mm(row[f"settled_error_{axis}"]["mean"]) for axis in "xy"]
-        cells += [figures(row[key]["mean"]) for key in ("thrust_effort", "thrust_variation")]
-        rows.add_row(name, *cells, str(row["failures"]))
+    for name, row in result.results.items():
+        errors, settled = row.errors.values(), row.by_axis("settled_error").values()
+        cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
+        cells += [mm(each.worst) for each in errors] + [mm(each.mean) for each in settled]
+        cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
+        rows.add_row(name, *cells, str(row.failures))
     return rows

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from rich.markdown import Markdown
-from usm_baselines.benchmark.leaderboard import MAIN, cells, document, everyone, front, suites
+from usm_baselines.benchmark.leaderboard import MAIN, everyone, front, leaderboard, places, suites
 from usm_baselines.benchmark.leaderboard_page import csv_text, markdown, table, with_table
 
 from usm_cli.options import output_folder
@@ -21,9 +20,10 @@ from usm_cli.selection import (
     scored,
 )
 from usm_cli.terminal import output_console
+from usm_gym.evaluation import Evaluation
 from usm_gym.suites import NAMES
-from usm_gym.support.files import check_writable, holding, write_json, write_text
-from usm_gym.support.provenance import provenance
+from usm_gym.support.files import check_writable, holding, read_text, write_text
+from usm_gym.support.results import Provenance
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
@@ -63,7 +63,7 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Score, write the folder, print the main table."""
-    page = None if arguments.insert is None else Path(arguments.insert).read_text(encoding="utf-8")
+    page = None if arguments.insert is None else read_text(arguments.insert)
     if page is not None:
         check_writable(arguments.insert)
     folder = output_folder(arguments.output or f"results/{version('usm-gym')}")
@@ -72,23 +72,19 @@ def run(arguments: argparse.Namespace) -> None:
     named = arguments.policies is not None
     contenders = chosen_contenders(arguments.policies) if named else everyone()
     fronts = {} if named else front()
-    chosen = cells(contenders, fronts, suites(), arguments.time_limit)
+    chosen = places(contenders, fronts, suites(), arguments.time_limit)
     with holding(folder):
-        outcomes = scored([cell.task for cell in chosen], arguments, folder / "cache")
-        found = {
-            "kind": "leaderboard",
-            "version": version("usm-gym"),
-            **document(list(zip(chosen, outcomes, strict=True)), fronts),
-            "provenance": provenance({"suites": list(NAMES)}),
-        }
-        require(
-            MAIN in found["suites"], "--policies", arguments.policies, "one that acts, at least"
-        )
-        write_json(folder / "leaderboard.json", found)
-        write_text(folder / "leaderboard.csv", csv_text(found))
-        write_text(folder / "leaderboard.md", markdown(found))
+        outcomes = scored([place.job for place in chosen], arguments, folder / "cache")
+        pairs = list(zip(chosen, outcomes, strict=True))
+        acts = any(p.suite == MAIN and isinstance(outcome, Evaluation) for p, outcome in pairs)
+        require(acts, "--policies", arguments.policies, "one that acts, at least")
+        origin = Provenance.here({"suites": list(NAMES)})
+        result = leaderboard(pairs, fronts, version("usm-gym"), origin)
+        result.write(folder / "leaderboard.json")
+        write_text(folder / "leaderboard.csv", csv_text(result))
+        write_text(folder / "leaderboard.md", markdown(result))
         if page is not None:
-            write_text(arguments.insert, with_table(page, found))
-        draw_all(found, folder)
-    output_console().print(Markdown(table(found["suites"][MAIN])))
-    leave_if_refused({id: why for rows in found["refused"].values() for id, why in rows.items()})
+            write_text(arguments.insert, with_table(page, result))
+        draw_all(result, folder)
+    output_console().print(Markdown(table(result.main)))
+    leave_if_refused({id: why for rows in result.refused.values() for id, why in rows.items()})

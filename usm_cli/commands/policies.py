@@ -1,4 +1,4 @@
-"""`usm policies`: what there is to compare."""
+"""`usm policies`: the policies that can be compared."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_to(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "policies",
         help="list the registered policies",
-        description="List the registered policies; their names are what --policies takes.",
+        description="List the registered policies; --policies takes their names.",
     )
     parser.set_defaults(run=run)
 

@@ -37,7 +37,6 @@ def add_to(subparsers: Any) -> None:
         help="results as a page with replays",
         description=DESCRIPTION,
         epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("results", nargs="+", metavar="RESULT.json", help="files of results")
@@ -64,14 +63,13 @@ def run(arguments: argparse.Namespace) -> None:
     contenders = None if arguments.policies is None else chosen_contenders(arguments.policies)
     scenario = count(arguments, "scenario", 0, least=0)
     files = [Path(name) for name in arguments.results]
-    for file in files:
-        read(file)  # refuses what is no result before anything is computed
+    results = {file: read(file) for file in files}  # before anything is computed
     chapters = []
     with computing(arguments) as workers, progress_bar() as bar:
         choice = Choice(contenders, scenario, workers)
         for file in files:
             line = bar.add_task(f"replay {file.name}")
-            chapters.append(chapter(file, choice, partial(advance, bar, line)))
+            chapters.append(chapter(results[file], choice, partial(advance, bar, line)))
     write_text(path, html(chapters, provenance({})))
     size = path.stat().st_size / 1e6
     output_console().print(f"{path}: {size:.1f} MB", markup=False, soft_wrap=True)

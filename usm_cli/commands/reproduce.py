@@ -6,30 +6,30 @@ import argparse
 import math
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 from usm_baselines.paper.reproduction import (
-    HEADING_GAIN,
-    IMPLICIT_STEP,
-    PAPER,
+    AXES,
+    PARTS,
     SAMPLE_TIME,
-    SIGMA_START,
     STEP,
+    ReproductionResult,
     cases,
+    reproduction,
     run_cases,
-    table,
 )
 from usm_baselines.paper.reproduction_figures import NAMES
 
 from usm_cli.options import output_folder
 from usm_cli.terminal import empty_table, output_console, progress_bar
-from usm_gym.support.files import write_json, write_text
-from usm_gym.support.provenance import provenance
-from usm_gym.support.text import figures
+from usm_gym.support.files import write_text
+from usm_gym.support.results import Provenance
+from usm_gym.support.text import figures, mm
 from usm_gym.support.validation import require
-from usm_gym.task.sampling import named
-from usm_gym.task.scenario import MODES, Scenario
+
+if TYPE_CHECKING:  # its import takes time
+    from usm_baselines.paper.reproduction_fit import FitResult
 
 DESCRIPTION = """\
 Run the paper as printed: explicit laws and observer at a step of 1e-5 s, ideal thrusters without
@@ -49,7 +49,6 @@ examples:
   usm reproduce --output paper --study             every open item one at a time
   usm reproduce --output paper --fit               refit the declared scenario
 """
-COLUMNS = [(part, axis) for part in ("torpedo", "operation", "settled") for axis in ("x", "y")]
 GENERATIONS = 60
 
 
@@ -90,29 +89,14 @@ def run_table(folder: Path | None, step: float, names: list[str]) -> None:
     """Run all cases, print the table, write the folder."""
     chosen = cases(step)
     with progress_bar() as bar:
-        task = bar.add_task("runs", total=len(chosen))
-        records = run_cases(chosen, workers(), lambda: bar.advance(task))
-    result = table(chosen, records)
-    output_console().print(terminal_table(result["rows"]))
+        line = bar.add_task("runs", total=len(chosen))
+        records = run_cases(chosen, workers(), lambda: bar.advance(line))
+    result = reproduction(step, records, Provenance.here({}))
+    output_console().print(terminal_table(result))
     if folder is None:
         return
-    scenario: dict[str, Scenario] = {mode: named("table1", mode) for mode in MODES}
-    document = {
-        "kind": "reproduction",
-        "step": step,
-        "settle_time": scenario["operation"].settle_time,
-        **result,
-        "paper": PAPER,
-        "scenario": {
-            **{mode: each.to_dict() for mode, each in scenario.items()},
-            "heading_gain": HEADING_GAIN,
-            "sigma_start": list(SIGMA_START),
-            "implicit_step": IMPLICIT_STEP,
-        },
-        "provenance": provenance({}),
-    }
-    write_json(folder / "table1.json", document)
-    write_text(folder / "table1.md", markdown(result["rows"]))
+    result.write(folder / "table1.json")
+    write_text(folder / "table1.md", markdown(result))
     from usm_baselines.paper.reproduction_figures import draw
 
     draw(names, records, folder)
@@ -120,18 +104,18 @@ def run_table(folder: Path | None, step: float, names: list[str]) -> None:
 
 def run_study(folder: Path) -> None:
     """Run the sensitivity study, write study.json and study.png."""
-    from usm_baselines.paper.sensitivity import runs, study
+    from usm_baselines.paper.sensitivity import study, trials
     from usm_baselines.paper.sensitivity_figure import draw_study
 
     with progress_bar() as bar:
-        task = bar.add_task("study")
-        runs_done = study(
+        line = bar.add_task("study")
+        result = study(
             folder / "study.json",
             workers(),
-            lambda done, total: bar.update(task, completed=done, total=total),
-            runs(),
+            lambda done, total: bar.update(line, completed=done, total=total),
+            trials(),
         )
-    draw_study(runs_done, folder / "study.png")
+    draw_study(result, folder / "study.png")
 
 
 def run_fit(folder: Path) -> None:
@@ -139,14 +123,14 @@ def run_fit(folder: Path) -> None:
     from usm_baselines.paper.reproduction_fit import fit
 
     with progress_bar() as bar:
-        task = bar.add_task("fit")
-        found = fit(
+        line = bar.add_task("fit")
+        result = fit(
             folder / "fit.json",
             GENERATIONS,
             workers(),
-            lambda done, total: bar.update(task, completed=done, total=total),
+            lambda done, total: bar.update(line, completed=done, total=total),
         )
-    output_console().print(fit_table(found))
+    output_console().print(fit_table(result))
 
 
 def workers() -> int:
@@ -174,57 +158,60 @@ def check_step(step: float) -> None:
     )
 
 
-def lines(rows: dict[str, Any]) -> list[list[str]]:
+def columns(result: ReproductionResult) -> list[tuple[str, str]]:
+    """The columns of the table: a part and an axis each."""
+    return [(part, axis) for part in PARTS for axis in result.axes]
+
+
+def lines(result: ReproductionResult) -> list[list[str]]:
     """Our rows and the paper's, mm, with the ratio of ours to the paper's, as text."""
-    found = []
-    for name, row in rows.items():
-        found.append([f"{name}, ours", *(figures(1e3 * row[part][axis]) for part, axis in COLUMNS)])
-        if name in PAPER:
-            printed = PAPER[name]
-            theirs = [figures(1e3 * printed[part][axis]) for part, axis in COLUMNS]
-            ratio = [figures(row[part][axis] / printed[part][axis]) for part, axis in COLUMNS]
-            found += [[f"{name}, paper", *theirs], ["ratio", *ratio]]
-    return found
+    places = columns(result)
+    listed = []
+    for name, row in result.rows.items():
+        listed.append([f"{name}, ours", *(mm(row[part][axis]) for part, axis in places)])
+        if name in result.paper:
+            printed = result.paper[name]
+            theirs = [mm(printed[part][axis]) for part, axis in places]
+            ratio = [figures(row[part][axis] / printed[part][axis]) for part, axis in places]
+            listed += [[f"{name}, paper", *theirs], ["ratio", *ratio]]
+    return listed
 
 
-def terminal_table(rows: dict[str, Any]) -> Table:
+def terminal_table(result: ReproductionResult) -> Table:
     """Table 1 for the terminal."""
     shown = empty_table(
         "mm",
-        numbers=(f"{part}\n{axis}" for part, axis in COLUMNS),
+        numbers=(f"{part}\n{axis}" for part, axis in columns(result)),
         title="absolute maximum of the position error after settling",
     )
-    for line in lines(rows):
+    for line in lines(result):
         shown.add_row(*line)
     return shown
 
 
-def fit_table(found: dict[str, Any]) -> Table:
+def fit_table(result: FitResult) -> Table:
     """The numbers that the fit saw, and its freedoms, for the terminal."""
     shown = empty_table(
         "",
         numbers=("declared", "fitted"),
         title="ours over the paper's at a step of 1e-5 s, and what was free",
     )
-    for part, printed in found["seen"].items():
-        for index, axis in enumerate("xy"):
-            cells = [
-                figures(found[name]["paper"]["numbers"][part][index] / printed[index])
-                for name in ("declared", "fitted")
-            ]
-            shown.add_row(f"{part} {axis}", *cells)
-    cells = [figures(found[name]["paper"]["residual"]) for name in ("declared", "fitted")]
-    shown.add_row("residual", *cells)
-    for freedom in found["freedom"]:
-        cells = [figures(found[name]["freedoms"][freedom]) for name in ("declared", "fitted")]
-        shown.add_row(freedom, *cells)
+    candidates = (result.declared, result.fitted)
+    for part, printed in result.seen.items():
+        for index, axis in enumerate(AXES):
+            made = [each.paper.numbers[part][index] for each in candidates]
+            shown.add_row(f"{part} {axis}", *(figures(each / printed[index]) for each in made))
+    shown.add_row("residual", *(figures(each.paper.residual) for each in candidates))
+    for freedom in result.freedom:
+        shown.add_row(freedom, *(figures(each.freedoms[freedom]) for each in candidates))
     return shown
 
 
-def markdown(rows: dict[str, Any]) -> str:
+def markdown(result: ReproductionResult) -> str:
     """The table as Markdown."""
-    head = "| mm | " + " | ".join(f"{part} {axis}" for part, axis in COLUMNS) + " |"
-    rule = "|---|" + "---|" * len(COLUMNS)
-    body = ["| " + " | ".join(line) + " |" for line in lines(rows)]
+    places = columns(result)
+    head = "| mm | " + " | ".join(f"{part} {axis}" for part, axis in places) + " |"
+    rule = "|---|" + "---|" * len(places)
+    body = ["| " + " | ".join(line) + " |" for line in lines(result)]
     title = "Absolute maximum of the position error after settling (Table 1 of the paper).\n"
     return "\n".join([title, head, rule, *body]) + "\n"

@@ -7,7 +7,12 @@ from typing import Any
 
 from rich.table import Table
 from usm_baselines.benchmark import robustness
-from usm_baselines.benchmark.robustness import QUANTITIES
+from usm_baselines.benchmark.robustness import (
+    QUANTITIES,
+    RefusedPoint,
+    RobustnessResult,
+    ScoredPoint,
+)
 
 from usm_cli.options import output_folder
 from usm_cli.selection import (
@@ -17,14 +22,13 @@ from usm_cli.selection import (
     add_scoring,
     chosen_contenders,
     chosen_scenarios,
+    jobs,
     leave_if_refused,
     scored,
     seeds,
-    tasks,
 )
 from usm_cli.terminal import empty_table, output_console
-from usm_gym.support.files import write_json
-from usm_gym.support.provenance import provenance
+from usm_gym.support.results import Provenance
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 
@@ -68,32 +72,23 @@ def run(arguments: argparse.Namespace) -> None:
     values = quantity.values if arguments.values is None else parse_values(arguments.values)
     scenarios = chosen_scenarios(arguments)
     contenders = chosen_contenders(arguments.policies)
-    tasks(contenders, scenarios, arguments.time_limit)  # refuses what cannot be made
-    chosen = robustness.tasks(contenders, scenarios, quantity, values, arguments.time_limit)
+    jobs(contenders, scenarios, arguments.time_limit)  # refuses what cannot be made
+    chosen = robustness.jobs(contenders, scenarios, quantity, values, arguments.time_limit)
     folder = output_folder(arguments.output)
     outcomes = scored(chosen, arguments, folder / "cache")
-    found = robustness.curves([each.name for each in contenders], values, outcomes)
-    document = {
-        "kind": "robustness",
-        "quantity": arguments.vary,
-        "label": quantity.label,
-        "values": list(values),
-        "scenarios": [scenario.to_dict() for scenario in scenarios],
-        "results": found,
-        "provenance": provenance(seeds(arguments)),
-    }
-    write_json(folder / f"{arguments.vary}.json", document)
-    figure = robustness.draw(found, quantity.label)
-    figure.savefig(folder / f"{arguments.vary}.png", dpi=120, metadata={"Software": None})
-    output_console().print(table(found, quantity.label))
-    leave_if_refused(
-        {
-            f"{name} at {point['value']:g}": point["refused"]
-            for name, points in found.items()
-            for point in points
-            if "refused" in point
-        }
+    result = RobustnessResult(
+        quantity=arguments.vary,
+        label=quantity.label,
+        values=values,
+        scenarios=tuple(scenarios),
+        results=robustness.curves([each.name for each in contenders], values, outcomes),
+        provenance=Provenance.here(seeds(arguments)),
     )
+    result.write(folder / f"{arguments.vary}.json")
+    figure = robustness.draw(result)
+    figure.savefig(folder / f"{arguments.vary}.png", dpi=120, metadata={"Software": None})
+    output_console().print(table(result))
+    leave_if_refused(result.refused)
 
 
 def parse_values(text: str) -> tuple[float, ...]:
@@ -106,21 +101,21 @@ def parse_values(text: str) -> tuple[float, ...]:
     return values
 
 
-def table(found: dict[str, Any], label: str) -> Table:
-    """Mean errors x / y in mm, a row for each policy."""
-    values = [point["value"] for point in next(iter(found.values()))]
+def table(result: RobustnessResult) -> Table:
+    """Mean errors in mm, a row for each policy."""
+    axes = " / ".join(result.axes)
     rows = empty_table(
         "policy",
-        *(f"{value:g}" for value in values),
-        title=f"largest position error after settling, mm, x / y, against {label}",
+        *(f"{value:g}" for value in result.values),
+        title=f"largest position error after settling, mm, {axes}, against {result.label}",
     )
-    for name, points in found.items():
+    for name, points in result.results.items():
         rows.add_row(name, *map(cell, points))
     return rows
 
 
-def cell(point: dict[str, Any]) -> str:
+def cell(point: ScoredPoint | RefusedPoint) -> str:
     """The errors at one value."""
-    if "refused" in point:
+    if isinstance(point, RefusedPoint):
         return "refused"
-    return " / ".join(mm(point[f"max_error_{axis}"]["mean"]) for axis in "xy")
+    return " / ".join(mm(error.mean) for error in point.errors.values())

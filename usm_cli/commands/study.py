@@ -10,8 +10,8 @@ from rich.markdown import Markdown
 
 from usm_cli.options import add_computing, check_installed, computing, output_folder
 from usm_cli.terminal import output_console, progress_bar
-from usm_gym.support.files import holding, write_json, write_text
-from usm_gym.support.provenance import provenance
+from usm_gym.support.files import holding, write_text
+from usm_gym.support.results import Provenance
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
@@ -60,34 +60,27 @@ def run(arguments: argparse.Namespace) -> None:
     check_installed("usm study", "agents", "sb3_contrib")
     from usm_agents.learning.plan import TEST_SEED
     from usm_agents.study import figures, page, plans, scores, trainings
-    from usm_agents.study.dissection import dissected
 
     for name, least in (("seeds", 1), ("episodes", 2), ("steps", 1)):
         value = getattr(arguments, name)
         require(value is None or value >= least, f"--{name}", value, f"{least} or more")
     names = list(plans.PLANS) if arguments.only is None else arguments.only.split(",")
     folder = output_folder(arguments.output)
-    runs = trainings.runs(names, arguments.seeds, folder, arguments.steps)
+    chosen = trainings.planned(names, arguments.seeds, folder, arguments.steps)
     with holding(folder):
         with computing(arguments) as workers, progress_bar() as bar:
-            line = bar.add_task("trainings", total=len(runs))
-            trainings.train_all(runs, workers, lambda run: bar.advance(line))
-            tasks = scores.tasks(runs, plans.RIVALS, arguments.episodes)
-            line = bar.add_task(
-                "episodes", total=sum(len(task.scenarios) for task in tasks.values())
-            )
+            line = bar.add_task("trainings", total=len(chosen))
+            trainings.train_all(chosen, workers, lambda training: bar.advance(line))
+            jobs = scores.jobs(chosen, plans.RIVALS, arguments.episodes)
+            line = bar.add_task("episodes", total=sum(len(job.scenarios) for job in jobs.values()))
             cache = folder / "cache"
-            outcomes = scores.score(tasks, workers, cache, lambda count: bar.advance(line, count))
-            found = {
-                **scores.document(runs, outcomes, plans.RIVALS),
-                "episodes": arguments.episodes,
-                "dissected": dissected(runs),
-                "provenance": provenance({"trainings": arguments.seeds, "scenarios": TEST_SEED}),
-            }
-        write_json(folder / "study.json", found)
+            outcomes = scores.score(jobs, workers, cache, lambda count: bar.advance(line, count))
+            origin = Provenance.here({"trainings": arguments.seeds, "scenarios": TEST_SEED})
+            result = scores.study(chosen, outcomes, plans.RIVALS, arguments.episodes, origin)
+        result.write(folder / "study.json")
         if arguments.ship is not None:
-            trainings.ship(runs, Path(arguments.ship), found["provenance"])
-        text = page.markdown(found)
+            trainings.ship(chosen, Path(arguments.ship), origin.command)
+        text = page.markdown(result)
         write_text(folder / "study.md", text)
-        figures.draw_all(found, folder)
+        figures.draw_all(result, folder)
     output_console().print(Markdown(text))

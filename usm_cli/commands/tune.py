@@ -18,10 +18,11 @@ from usm_gym.task.conditions import FIELD
 from usm_gym.task.scenario import MODES
 
 DESCRIPTION = """\
-Look for the gains of a policy with the smallest mean of max_error_x + max_error_y, in mm, plus a
-weight times the thrust variation. Scenarios are sampled for tuning alone: no frozen suite is ever
-seen. An interrupted tuning goes on where it stopped when the same command is given again, and its
-result is the same for any number of workers. Needs the extra `tune`.
+Look for the gains of a policy with the smallest objective: the mean of the largest errors of all
+axes, added up, in mm, plus a weight times the thrust variation. Scenarios are sampled for tuning
+alone: no frozen suite is ever seen. An interrupted tuning goes on where it stopped when the same
+command is given again, and its result is the same for any number of workers. Needs the extra
+`tune`.
 """
 EXAMPLES = """\
 examples:

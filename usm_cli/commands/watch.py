@@ -22,6 +22,7 @@ from usm_gym.evaluation import Trajectory, score
 from usm_gym.support.files import check_writable
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
+from usm_gym.task.metrics import MAX_ERROR, axes_of
 
 DESCRIPTION = """\
 Watch a policy in an episode, or two side by side on the same scenario and noise, in a window
@@ -94,13 +95,14 @@ def run(arguments: argparse.Namespace) -> None:
 
 def table(trajectories: dict[str, Trajectory]) -> Table:
     """The errors of the episode in mm."""
+    scores = {name: score(trajectory) for name, trajectory in trajectories.items()}
+    axes = axes_of(next(iter(scores.values())))
     rows = empty_table(
         "policy",
-        numbers=("x", "y", "lost"),
+        numbers=(*axes, "lost"),
         title="largest position error after settling, mm, in this episode",
     )
-    for name, trajectory in trajectories.items():
-        row = score(trajectory)
-        errors = [mm(row[f"max_error_{axis}"]) for axis in "xy"]
-        rows.add_row(name, *errors, "yes" if trajectory.lost else "no")
+    for name, row in scores.items():
+        errors = [mm(row[MAX_ERROR + axis]) for axis in axes]
+        rows.add_row(name, *errors, "yes" if row["failed"] else "no")
     return rows

@@ -1,5 +1,5 @@
-"""Results as one page of HTML, complete in itself (needs the extra `report`).
+"""Shows results as one self-contained page of HTML (needs the extra `report`).
 
-`chapters` says what a kind of result shows, in the blocks of `blocks`; `replay` computes episodes
-anew; `page` puts it all into the templates.
+`chapters` turns a kind of result into the blocks of `blocks`, `replay` computes episodes again, and
+`page` fills the templates.
 """

@@ -50,14 +50,16 @@ class Column:
     Attributes:
         title: What it holds, with the unit.
         ticks: Labels of the scale on which marks are drawn, and where, per cent of the width.
+        marked: The axes whose marks it has, in order.
     """
 
     title: str
     ticks: Sequence[tuple[str, float]] = ()
+    marked: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
-class Table:
+class SortableTable:
     """A table whose columns sort; the first cell of a row names it."""
 
     columns: Sequence[Column]
@@ -80,7 +82,7 @@ class Tables:
     title: str
     lead: str
     label: str
-    tables: Mapping[str, Table]
+    tables: Mapping[str, SortableTable]
 
 
 @dataclass(frozen=True)

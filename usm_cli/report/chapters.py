@@ -8,32 +8,41 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from usm_baselines.benchmark.leaderboard import MAIN, suites
+from usm_agents.study.results import MAIN_MODE, Rival, StudyResult, Trained
+from usm_baselines.benchmark.leaderboard import MAIN, LeaderboardResult, suites
+from usm_baselines.benchmark.results import EvaluationResult, Scores
+from usm_baselines.benchmark.robustness import RobustnessResult
 from usm_baselines.contender import Contender, contender
-from usm_baselines.paper.reproduction import cases, run_case, side_by_side
+from usm_baselines.paper.reproduction import (
+    PARTS,
+    ReproductionResult,
+    cases,
+    run_case,
+    side_by_side,
+)
 from usm_baselines.registry import entry, ids
 
 from usm_cli.report import plots
-from usm_cli.report.blocks import Chapter, Facts, Replay, Tables
-from usm_cli.report.replay import differing, recorded, replayed
+from usm_cli.report.blocks import Chapter, Facts, Plot, Replay, Tables
+from usm_cli.report.replay import PLANE, differing, recorded, replayed
 from usm_cli.report.tables import (
-    ERRORS,
-    PARTS,
-    Row,
+    competes,
     conditions_table,
     curve_table,
     paper_table,
     score_table,
 )
-from usm_cli.report.words import PAPERS, in_words, motion, total, verdict
+from usm_cli.report.words import PAPERS, in_words, motion, verdict
 from usm_gym.suites import unseen
 from usm_gym.support.files import read_json
-from usm_gym.support.text import figures
-from usm_gym.support.validation import in_one_line, require
+from usm_gym.support.results import Provenance, Result
+from usm_gym.support.text import figures, listed
+from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
+from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import OtherScenario
 
-Document = Mapping[str, Any]
 Progress = Callable[[int, int], object]
 
 SCORES = (
@@ -62,127 +71,113 @@ class Choice:
     workers: int = 1
 
 
-def read(path: Path) -> Document:
+def read(path: Path) -> Result:
     """A result from its file.
 
     Raises:
-        ValueError: If it is none, or of no kind that has a chapter.
+        UsageError: If it is none, or of no kind that has a chapter.
         OSError: If it cannot be read.
     """
     document = read_json(path)
     kind = document.get("kind") if isinstance(document, dict) else None
-    require(isinstance(kind, str) and kind in KINDS, f"kind of {path}", kind, ", ".join(KINDS))
-    found: Document = document
-    return found
+    known = {each.kind: each for each in CHAPTERS}
+    require(isinstance(kind, str) and kind in known, f"kind of {path}", kind, ", ".join(known))
+    return known[str(kind)].parsed(document, path)
 
 
-def chapter(path: Path, choice: Choice, progress: Progress) -> Chapter:
+def chapter(result: Result, choice: Choice, progress: Progress) -> Chapter:
     """What there is to show of a result.
 
     Args:
-        path: Its file.
+        result: The result.
         choice: What is replayed.
         progress: Called with the number of episodes that are computed, and that there are.
 
     Raises:
-        ValueError: If the file holds no result, or nothing can be replayed as chosen.
-        OSError: If it cannot be read.
+        UsageError: If nothing can be replayed as chosen.
     """
-    document = read(path)
-    kind = document["kind"]
-    try:
-        return KINDS[kind](document, choice, progress)
-    except (KeyError, TypeError, AttributeError, IndexError) as error:
-        fault = f"{type(error).__name__}: {in_one_line(error)}"
-        raise ValueError(f"{path} is no complete {kind}: {fault}") from error
+    return CHAPTERS[type(result)](result, choice, progress)
 
 
-def evaluation(result: Document, choice: Choice, progress: Progress) -> Chapter:
+def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> Chapter:
     """Several policies on one list of scenarios."""
-    name = result["suite"] or "sampled"
-    scenarios = [Scenario.from_dict(each) for each in result["scenarios"]]
-    rows = dict(sorted(result["results"].items(), key=lambda pair: total(pair[1])))
+    name, scenarios = result.suite or "sampled", result.scenarios
+    rows = by_total(result.results)
     return Chapter(
         title=f"Evaluation: {name}",
         lead=f"{len(rows)} policies on {len(scenarios)} episodes.",
         motion=motion(rows),
         verdict=verdict(rows, len(scenarios)),
         blocks=[
-            replay(scenarios, rows, choice, progress),
-            Tables("Scores", SCORES, "suite", {name: score_table(rows, result["refused"])}),
-            plots.front(rows, {}),
-            Tables("Conditions", CONDITIONS, "suite", {name: conditions_table({name: scenarios})}),
+            replay(scenarios, rows, result.axes, choice, progress),
+            Tables("Scores", SCORES, "suite", {name: score_table(rows, result.refused)}),
+            *front(rows, result.axes),
+            *conditions("suite", name, scenarios),
             names(),
-            provenance(result["provenance"]),
+            provenance(result.provenance),
         ],
     )
 
 
-def leaderboard(result: Document, choice: Choice, progress: Progress) -> Chapter:
+def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -> Chapter:
     """Every policy on every suite."""
     scenarios = suites()
-    rows = result["suites"][MAIN]
+    rows = result.main
     episodes = len(scenarios[MAIN])
     tables = {
-        name: score_table(each, result["refused"].get(name, {}))
-        for name, each in result["suites"].items()
+        name: score_table(each, result.refused.get(name, {}))
+        for name, each in result.suites.items()
     }
-    known = {name: scenarios[name] for name in result["suites"]}
+    known = {name: scenarios[name] for name in result.suites if name in scenarios}
     return Chapter(
-        title=f"Leaderboard of usm-gym {result['version']}",
+        title=f"Leaderboard of usm-gym {result.version}",
         lead=f"{len(rows)} policies on {len(tables)} suites; {MAIN}, with {episodes} episodes, "
         "is the main one.",
         motion=motion(rows),
         verdict=verdict(rows, episodes),
         blocks=[
-            replay(scenarios[MAIN], rows, choice, progress),
+            replay(scenarios[MAIN], rows, result.axes, choice, progress),
             Tables("Scores", SCORES, "suite", tables),
-            plots.front(rows, result["front"]),
+            plots.front(rows, result.front),
             Tables("Conditions", CONDITIONS, "suites", {"all": conditions_table(known)}),
             names(),
-            provenance(result["provenance"]),
+            provenance(result.provenance),
         ],
     )
 
 
-def robustness(result: Document, choice: Choice, progress: Progress) -> Chapter:
+def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> Chapter:
     """Error against one quantity."""
-    scenarios = [Scenario.from_dict(each) for each in result["scenarios"]]
-    curves, label = result["results"], result["label"]
+    scenarios, label = result.scenarios, result.label
     return Chapter(
-        title=f"Robustness: {result['quantity']}",
-        lead=f"How the errors of {len(curves)} policies grow with one quantity, all else being "
-        f"equal, over {len(scenarios)} episodes at each value: {label}.",
+        title=f"Robustness: {result.quantity}",
+        lead=f"How the errors of {len(result.results)} policies grow with one quantity, all else "
+        f"being equal, over {len(scenarios)} episodes at each value: {label}.",
         motion="",
         verdict="",
         blocks=[
-            plots.robustness(curves, label),
+            *([plots.robustness(result)] if result.axes else []),
             Tables(
                 "Errors",
                 "Largest position error after settling, mm: mean with its 95 % interval, by "
                 f"{label}.",
                 "quantity",
-                {label: curve_table(curves)},
+                {label: curve_table(result)},
             ),
-            replay(scenarios, {name: {} for name in curves}, choice, progress),
-            Tables(
-                "Conditions",
-                f"{CONDITIONS} These are the conditions before anything is varied.",
-                "suite",
-                {"scenarios": conditions_table({"scenarios": scenarios})},
-            ),
+            replay(scenarios, dict.fromkeys(result.results), result.axes, choice, progress),
+            *conditions("suite", "scenarios", scenarios, " These hold before anything is varied."),
             names(),
-            provenance(result["provenance"]),
+            provenance(result.provenance),
         ],
     )
 
 
-def reproduction(result: Document, choice: Choice, progress: Progress) -> Chapter:
+def reproduction(result: ReproductionResult, choice: Choice, progress: Progress) -> Chapter:
     """The paper's Table 1, and its operation mode as a replay at the paper's step."""
-    rows, paper, step = result["rows"], result["paper"], result["step"]
+    rows, paper, step = result.rows, result.paper, result.step
     require(choice.policies is None, "--policies", "given", "none: a reproduction has its own laws")
     require(choice.scenario == 0, "--scenario", choice.scenario, "0: a reproduction has one")
-    chosen = {each.row: each for each in cases(step) if each.mode == "operation"}
+    chosen = {each.row: each for each in cases(step) if each.mode == MAIN_MODE}
     records = {}
     for name, record in side_by_side(run_case, chosen, os.cpu_count() or 1):
         records[name] = record
@@ -193,7 +188,7 @@ def reproduction(result: Document, choice: Choice, progress: Progress) -> Chapte
         rows[name][part][axis] / paper[name][part][axis]
         for name in paper
         for part in PARTS
-        for axis in "xy"
+        for axis in result.axes
     ]
     return Chapter(
         title="Reproduction of Table 1",
@@ -207,7 +202,7 @@ def reproduction(result: Document, choice: Choice, progress: Progress) -> Chapte
                 "after each change of the joint references. Ours over the paper's lies between "
                 f"{figures(min(ratios))} and {figures(max(ratios))}.",
                 "table",
-                {"Table 1": paper_table(rows, paper)},
+                {"Table 1": paper_table(result)},
             ),
             Replay(
                 "Operation mode, replayed",
@@ -215,70 +210,113 @@ def reproduction(result: Document, choice: Choice, progress: Progress) -> Chapte
                 recorded(scenario, records),
                 ("sta", "pd"),
             ),
-            provenance(result["provenance"]),
+            provenance(result.provenance),
         ],
     )
 
 
-def study(result: Document, choice: Choice, progress: Progress) -> Chapter:
+def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     """Trained agents beside the classical policies."""
-    kinds = {"agents": True, "ablations": False}
-    trained = {
-        title: {name: row for name, row in result["rows"].items() if row["agent"] is agent}
-        for title, agent in kinds.items()
+    everyone: dict[str, Trained | Rival] = {
+        **result.agents,
+        **result.rivals,
+        **result.ablations,
     }
-    everyone = {**trained["agents"], **result["rivals"], **trained["ablations"]}
-    scores = {
-        (row["mode"], kind, name): {**each, "competitor": True}
-        for name, row in everyone.items()
-        for kind, each in row["scores"].items()
-    }
-    tables = {
-        f"{mode}, {kind}": score_table(
-            {name: row for (m, k, name), row in scores.items() if (m, k) == (mode, kind)}, {}
-        )
-        for mode, kind in dict.fromkeys((mode, kind) for mode, kind, _ in scores)
-    }
-    home = {
-        name: row
-        for (mode, kind, name), row in scores.items()
-        if (mode, kind) == ("operation", result["home"]) and name not in trained["ablations"]
-    }
-    home = dict(sorted(home.items(), key=lambda pair: total(pair[1])))
-    episodes = unseen("operation", FIELD, result["seed"], result["episodes"])
+    tables: dict[str, dict[str, Scores]] = {}
+    for name, row in everyone.items():
+        for kind, scores in row.scores.items():
+            tables.setdefault(f"{row.mode}, {kind}", {})[name] = scores
+    home = by_total(
+        {
+            name: row.scores[result.home]
+            for name, row in everyone.items()
+            if row.mode == MAIN_MODE and name not in result.ablations
+        }
+    )
+    episodes = unseen(MAIN_MODE, FIELD, result.seed, result.episodes)
+    trained = [rows for rows in (result.agents, result.ablations) if rows]
     return Chapter(
         title="Study of residual agents",
-        lead=f"{len(trained['agents'])} agents under several seeds, and what they owe to what.",
+        lead=f"{len(result.agents)} agents under several seeds, and what they owe to what.",
         motion=motion(home),
         verdict=verdict(home, len(episodes)),
         blocks=[
-            replay(episodes, home, choice, progress),
-            Tables("Scores", f"{SCORES} All seeds together.", "where", tables),
-            *(plots.learning(rows) for rows in trained.values() if rows),
-            plots.front(home, {}),
+            replay(episodes, home, result.axes, choice, progress),
+            Tables(
+                "Scores",
+                f"{SCORES} All seeds together.",
+                "where",
+                {name: score_table(rows, {}) for name, rows in tables.items()},
+            ),
+            *(plots.learning(rows, result.axes) for rows in trained),
+            *front(home, result.axes),
             names(),
-            provenance(result["provenance"]),
+            provenance(result.provenance),
         ],
     )
 
 
-KINDS: dict[str, Callable[[Document, Choice, Progress], Chapter]] = {
-    "evaluation": evaluation,
-    "leaderboard": leaderboard,
-    "robustness": robustness,
-    "reproduction": reproduction,
-    "study": study,
+CHAPTERS: dict[type[Result], Callable[[Any, Choice, Progress], Chapter]] = {
+    EvaluationResult: evaluation,
+    LeaderboardResult: leaderboard,
+    RobustnessResult: robustness,
+    ReproductionResult: reproduction,
+    StudyResult: study,
 }
 
 
+def by_total(rows: Mapping[str, Scores]) -> dict[str, Scores]:
+    """Rows, the smaller error first."""
+    return dict(sorted(rows.items(), key=lambda pair: pair[1].total))
+
+
+def conditions(
+    label: str, name: str, scenarios: Sequence[Scenario | OtherScenario], besides: str = ""
+) -> list[Tables]:
+    """The conditions of a result, if its scenarios are of the robot that has such."""
+    planar = planar_only(scenarios)
+    if not planar:
+        return []
+    table = {name: conditions_table({name: planar})}
+    return [Tables("Conditions", CONDITIONS + besides, label, table)]
+
+
+def planar_only(scenarios: Sequence[Scenario | OtherScenario]) -> list[Scenario]:
+    """Scenarios, if all are of the planar robot."""
+    planar = [each for each in scenarios if isinstance(each, Scenario)]
+    return planar if len(planar) == len(scenarios) else []
+
+
+def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
+    """Error against thrust variation, if anybody has scores."""
+    return [plots.front(rows, {})] if axes else []
+
+
 def replay(
-    scenarios: Sequence[Scenario], rows: Mapping[str, Row], choice: Choice, progress: Progress
+    scenarios: Sequence[Scenario | OtherScenario],
+    rows: Mapping[str, Scores | None],
+    axes: Sequence[str],
+    choice: Choice,
+    progress: Progress,
 ) -> Replay | Facts:
-    """An episode of the policies of a result, or why there is none to be seen."""
+    """An episode of the policies of a result, or why there is none to be seen.
+
+    Args:
+        scenarios: The scenarios of the result.
+        rows: The policies, with the scores that they have on these scenarios.
+        axes: The axes of the result.
+        choice: What is replayed.
+        progress: As of `chapter`.
+    """
     index = choice.scenario
     require(index < len(scenarios), "--scenario", index, f"0 to {len(scenarios) - 1}")
+    title = f"Episode {index}, replayed"
+    planar = planar_only(scenarios)
+    if not planar or (axes and tuple(axes) != PLANE):
+        plane = f"a replay draws a robot in the plane of {listed(PLANE)}"
+        return Facts("Replay", {"none": f"{plane}, and this result is in {listed(axes)}"})
     contenders, missing = able(rows, choice)
-    scenario, done = scenarios[index], 0
+    scenario, done = planar[index], 0
 
     def advance() -> None:
         nonlocal done
@@ -287,28 +325,36 @@ def replay(
 
     episodes = replayed(contenders, scenario, choice.workers, advance)
     missing |= episodes.missing
-    title = f"Episode {index}, replayed"
     shown = list(episodes.data["episodes"])
     if not shown:
         return Facts(title, missing)
-    scores = {
-        name: tuple(rows[name]["per_episode"][each][index] for each in ERRORS)
-        for name in shown
-        if "per_episode" in rows.get(name, {})
-    }
     notes = [f"{name} is not replayed: {why}" for name, why in missing.items()]
-    changed = differing(episodes.max_error, scores)
+    changed = differing(episodes.max_error, episode_errors(rows, shown, index))
     if changed:
         notes.append(
             f"Not as in the result, for something has changed since: {', '.join(changed)}."
         )
-    best = next((name for name in shown if rows.get(name, {}).get("competitor", True)), shown[0])
+    able_to_win = (name for name in shown if (row := rows.get(name)) is None or competes(row))
+    best = next(able_to_win, shown[0])
     others = [name for name in shown if name != best]
     beside = PAPERS if PAPERS in others else others[0] if others else ""
     return Replay(title, in_words(scenario), episodes.data, (best, beside), notes)
 
 
-def able(rows: Mapping[str, Row], choice: Choice) -> tuple[list[Contender], dict[str, str]]:
+def episode_errors(
+    rows: Mapping[str, Scores | None], names: Sequence[str], index: int
+) -> dict[str, tuple[float, ...]]:
+    """The largest errors of an episode in each axis, m, of those policies whose scores tell."""
+    known = {name: row for name in names if (row := rows.get(name)) and index < row.episodes}
+    return {
+        name: tuple(row.per_episode[MAX_ERROR + axis][index] for axis in row.axes)
+        for name, row in known.items()
+    }
+
+
+def able(
+    rows: Mapping[str, Scores | None], choice: Choice
+) -> tuple[list[Contender], dict[str, str]]:
     """The policies to be replayed, and why others are not.
 
     A file of results is given nothing to open or to run: of the names in it only those of
@@ -323,20 +369,20 @@ def able(rows: Mapping[str, Row], choice: Choice) -> tuple[list[Contender], dict
 
 def names() -> Facts:
     """What the names of the policies mean."""
-    found = {id: entry(id).summary for id in ids() if not id.endswith("-tuned")}
-    found["…-tuned"] = "the same law with gains that usm tune has found on sampled scenarios"
-    return Facts("What the names mean", found)
+    meanings = {id: entry(id).summary for id in ids() if not id.endswith("-tuned")}
+    meanings["…-tuned"] = "the same law with gains that usm tune has found on sampled scenarios"
+    return Facts("What the names mean", meanings)
 
 
-def provenance(found: Row) -> Facts:
+def provenance(source: Provenance) -> Facts:
     """Where a result comes from."""
-    packages = ", ".join(f"{name} {version}" for name, version in found["packages"].items())
-    seeds = "; ".join(f"{name}: {_listed(value)}" for name, value in found["seeds"].items())
+    packages = ", ".join(f"{name} {version}" for name, version in source.packages.items())
+    seeds = "; ".join(f"{name}: {_listed(value)}" for name, value in source.seeds.items())
     return Facts(
         "Where this comes from",
         {
-            "command": found["command"],
-            "version": f"usm-gym {found['version']}, commit {found['commit'] or 'unknown'}",
+            "command": source.command,
+            "version": f"usm-gym {source.version}, commit {source.commit or 'unknown'}",
             "packages": packages,
             "seeds": seeds,
         },

@@ -24,11 +24,11 @@ SCRIPTS = (
 
 
 def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
-    """One page with all chapters, which needs nothing but itself.
+    """Write one self-contained page with all chapters.
 
     Args:
-        chapters: What it shows.
-        made: What made it, as `usm_gym.support.provenance` says.
+        chapters: The chapters.
+        made: The provenance of the page, from `usm_gym.support.provenance`.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("usm_cli.report", "page"),
@@ -39,8 +39,8 @@ def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
     )
     return environment.get_template("page.html").render(
         chapters=chapters,
-        motion=next((each.motion for each in chapters if each.motion), ""),
-        verdict=next((each.verdict for each in chapters if each.verdict), ""),
+        motion=next((chapter.motion for chapter in chapters if chapter.motion), ""),
+        verdict=next((chapter.verdict for chapter in chapters if chapter.verdict), ""),
         made=made,
         styles=_text(STYLES),
         scripts=_text(SCRIPTS),

@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from usm_agents.study.results import Trained
+from usm_baselines.benchmark.leaderboard import FrontPoint
+from usm_baselines.benchmark.results import Scores, axes_in
+from usm_baselines.benchmark.robustness import RobustnessResult, ScoredPoint
+
 from usm_cli.report.blocks import Plot
-from usm_cli.report.tables import Row
+from usm_cli.report.tables import competes
 
 VARIATION = "thrust variation, N/s"
 
 
-def front(rows: Mapping[str, Row], weights: Mapping[str, Sequence[Row]]) -> Plot:
+@dataclass(frozen=True)
+class Band:
+    """Errors at a place of a curve.
+
+    Attributes:
+        value: The place.
+        errors: Lower limit, mean and upper limit by axis, m; empty where there are none.
+    """
+
+    value: float
+    errors: Mapping[str, tuple[float, float, float]]
+
+
+def front(rows: Mapping[str, Scores], weights: Mapping[str, Sequence[FrontPoint]]) -> Plot:
     """Error against thrust variation, and which policies no other beats in both.
 
     Args:
@@ -19,21 +38,21 @@ def front(rows: Mapping[str, Row], weights: Mapping[str, Sequence[Row]]) -> Plot
         weights: Points of policies that are tuned with other weights, by their id.
     """
     besides = f" A line joins other weights of {', '.join(weights)}." if weights else ""
+    variations = {name: row.metrics["thrust_variation"].mean for name, row in rows.items()}
+    shown = {name: row for name, row in rows.items() if competes(row) and variations[name] > 0}
     panels = []
-    for axis in "xy":
-        points = [
-            {"name": name, "x": row["thrust_variation"]["mean"], "y": row[error]["mean"] * 1e3}
-            for name, row in rows.items()
-            if row["competitor"] and row["thrust_variation"]["mean"] > 0
-            for error in (f"max_error_{axis}",)
+    for axis in axes_in(rows.values()):
+        points: list[dict[str, Any]] = [
+            {"name": name, "x": variations[name], "y": row.errors[axis].mean * 1e3}
+            for name, row in shown.items()
         ]
         lines = [
             {
                 "name": f"{name}, other weights",
-                "x": [point["thrust_variation"] for point in listed],
-                "y": [1e3 * point[f"max_error_{axis}"] for point in listed],
+                "x": [point.thrust_variation for point in line],
+                "y": [1e3 * point.errors[axis] for point in line],
             }
-            for name, listed in weights.items()
+            for name, line in weights.items()
         ]
         panels.append(
             {
@@ -64,54 +83,66 @@ def beaten(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> boo
     )
 
 
-def robustness(curves: Mapping[str, Sequence[Row]], label: str) -> Plot:
+def robustness(result: RobustnessResult) -> Plot:
     """Error against a quantity, with intervals."""
+    curves = {
+        name: [
+            Band(
+                point.value,
+                {axis: (e.ci95[0], e.mean, e.ci95[1]) for axis, e in point.errors.items()}
+                if isinstance(point, ScoredPoint)
+                else {},
+            )
+            for point in points
+        ]
+        for name, points in result.results.items()
+    }
     return error_curves(
         "Error curves",
         "Largest position error after settling, mean over the episodes; shaded is its 95 % "
         "interval.",
         curves,
-        label,
+        result.axes,
+        result.label,
     )
 
 
-def learning(rows: Mapping[str, Row]) -> Plot:
+def learning(rows: Mapping[str, Trained], axes: Sequence[str]) -> Plot:
     """Error against the steps of a training, from the best seed to the worst."""
-    curves: dict[str, list[Row]] = {}
+    curves: dict[str, list[Band]] = {}
     for name, row in rows.items():
         curves[name] = []
-        for points in zip(*row["curves"].values(), strict=False):
-            point: dict[str, Any] = {"value": points[0]["steps"] / 1e6}
-            for axis in ("max_error_x", "max_error_y"):
-                errors = [each[axis] for each in points]
-                mean = sum(errors) / len(errors)
-                point[axis] = {"mean": mean, "ci95": (min(errors), max(errors))}
-            curves[name].append(point)
+        for points in zip(*row.curves.values(), strict=False):
+            errors = {axis: [point.errors[axis] for point in points] for axis in axes}
+            bands = {axis: (min(e), sum(e) / len(e), max(e)) for axis, e in errors.items()}
+            curves[name].append(Band(points[0].steps / 1e6, bands))
     return error_curves(
         "Learning curves",
         "Largest position error after settling on held-out scenarios; mean over the seeds, shaded "
         "from the best to the worst.",
         curves,
+        axes,
         "million steps",
     )
 
 
-def error_curves(title: str, text: str, curves: Mapping[str, Sequence[Row]], label: str) -> Plot:
-    """Errors in x and y against something."""
+def error_curves(
+    title: str,
+    text: str,
+    curves: Mapping[str, Sequence[Band]],
+    axes: Iterable[str],
+    label: str,
+) -> Plot:
+    """Errors in each axis against something."""
     panels = []
-    for axis in "xy":
+    for axis in axes:
         series = []
-        for name, points in curves.items():
-            known = [point.get(f"max_error_{axis}") for point in points]
+        for name, bands in curves.items():
+            known = [band.errors.get(axis) for band in bands]
             low, mean, high = (
-                [None if each is None else 1e3 * value(each) for each in known]
-                for value in (
-                    lambda score: score["ci95"][0],
-                    lambda score: score["mean"],
-                    lambda score: score["ci95"][1],
-                )
+                [None if each is None else 1e3 * each[k] for each in known] for k in range(3)
             )
-            values = [point["value"] for point in points]
+            values = [band.value for band in bands]
             series.append({"name": name, "x": values, "y": mean, "low": low, "high": high})
         panels.append({"label": f"error in {axis}, mm", "series": series})
     return Plot(

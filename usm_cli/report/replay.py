@@ -1,4 +1,7 @@
-"""Episodes for a page: computed anew, thinned out and packed."""
+"""Episodes for a page: computed anew, thinned out and packed.
+
+What is played is a chain of links in a plane: results with other axes than its have no replay.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +19,14 @@ from usm_cli.take import instants, take
 from usm_gym.evaluation import score
 from usm_gym.robot import Robot
 from usm_gym.support import parallel
+from usm_gym.support.validation import UsageError
+from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.scenario import Scenario
 
 Array = NDArray[np.float64]
 
+# The axes of the plane that the page draws.
+PLANE = ("x", "y")
 # Pictures of the robot per second; errors and thrust are kept as often as they are measured.
 FPS = 10.0
 # Of a record at the paper's step, one error and effort every so often, s.
@@ -37,13 +44,13 @@ class Acted:
         data: What the page plays of it.
         reference: Link angles of the reference posture at each picture, rad, (pictures, links).
         current: Velocity of the water at each picture, m/s, (pictures, 2).
-        max_error: Largest error after settling, m, x and y.
+        max_error: Largest error after settling in each axis, m.
     """
 
     data: dict[str, Any]
     reference: Array
     current: Array
-    max_error: tuple[float, float]
+    max_error: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -52,12 +59,12 @@ class Episodes:
 
     Attributes:
         data: What the page plays.
-        max_error: Largest error after settling of each policy, m, x and y.
+        max_error: Largest error after settling of each policy in each axis, m.
         missing: Why a policy is not there, by name.
     """
 
     data: dict[str, Any]
-    max_error: dict[str, tuple[float, float]]
+    max_error: dict[str, tuple[float, ...]]
     missing: dict[str, str]
 
 
@@ -117,22 +124,22 @@ def replayed(
 def act(contender: Contender, scenario: Scenario) -> Acted | str:
     """Let a policy act in a scenario; or why it cannot."""
     try:
-        found = take(contender, scenario, instants(scenario, FPS, 1.0))
-    except ValueError as error:
+        acted = take(contender, scenario, instants(scenario, FPS, 1.0))
+    except UsageError as error:
         return str(error)
-    pictures, row = found.pictures, score(found.trajectory)
+    pictures, row = acted.pictures, score(acted.trajectory)
     data = {
         "theta": packed(np.array([each.body.angles for each in pictures])),
         "thrust": packed(np.array([each.thrust for each in pictures])),
         "error": packed(pictures[-1].errors[1:]),
-        "effort": packed(np.abs(found.trajectory.command).mean(axis=1)),
-        "lost": found.trajectory.lost,
+        "effort": packed(np.abs(acted.trajectory.command).mean(axis=1)),
+        "lost": acted.trajectory.lost,
     }
     return Acted(
         data,
         np.array([each.reference.angles for each in pictures]),
         np.array([each.current for each in pictures]),
-        (float(row["max_error_x"]), float(row["max_error_y"])),
+        tuple(float(row[MAX_ERROR + axis]) for axis in PLANE),
     )
 
 
@@ -180,11 +187,11 @@ def frame(scenario: Scenario, robot: Robot, path: Array) -> dict[str, Any]:
 
 
 def differing(
-    found: Mapping[str, tuple[float, float]], expected: Mapping[str, tuple[float, float]]
+    errors: Mapping[str, tuple[float, ...]], expected: Mapping[str, tuple[float, ...]]
 ) -> list[str]:
-    """Policies whose largest errors, m, in x and y, are not as expected."""
+    """Policies whose largest errors in each axis, m, are not as expected."""
     return [
         name
-        for name, errors in expected.items()
-        if not np.allclose(found[name], errors, rtol=TOLERANCE, atol=0.0)
+        for name, wanted in expected.items()
+        if not np.allclose(errors[name], wanted, rtol=TOLERANCE, atol=0.0)
     ]

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
 
-from usm_baselines.benchmark.leaderboard_page import said
+from usm_baselines.benchmark.leaderboard import Lead, Standing
+from usm_baselines.benchmark.leaderboard_page import in_short
+from usm_baselines.benchmark.results import CompetitorScores, Scores, Summary, axes_in
+from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult
+from usm_baselines.paper.reproduction import PARTS, ReproductionResult
 
-from usm_cli.report.blocks import Cell, Column, Mark, Table
+from usm_cli.report.blocks import Cell, Column, Mark, SortableTable
 from usm_gym.statistics import interquartile_mean
-from usm_gym.support.text import figures, mm
+from usm_gym.support.text import figures, listed, mm
+from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.scenario import Scenario
 
-Row = Mapping[str, Any]
-ERRORS = ("max_error_x", "max_error_y")
 CONDITIONS = (
     "suite",
     "episodes",
@@ -27,22 +29,29 @@ CONDITIONS = (
     "coefficients, true over nominal",
     "joint motion",
 )
-PARTS = ("torpedo", "operation", "settled")
 
 
-def score_table(rows: Mapping[str, Row], refused: Mapping[str, str]) -> Table:
+def competes(row: Scores) -> bool:
+    """Whether a policy is told no more than a vehicle knows."""
+    return row.competitor if isinstance(row, CompetitorScores) else True
+
+
+def lead_of(row: Scores) -> Lead | None:
+    """A row's lead over the next, if it has one."""
+    return row.beats_next if isinstance(row, Standing) else None
+
+
+def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> SortableTable:
     """Scores of policies on the same scenarios, a row each."""
-    scale = LogScale([row[name] for row in rows.values() for name in ERRORS])
-    decided = any("beats_next" in row for row in rows.values())
+    scale = LogScale(error for row in rows.values() for error in row.errors.values())
+    decided = any(lead_of(row) for row in rows.values())
+    axes = axes_in(rows.values())
     columns = [
         Column("policy"),
-        Column("error x, mm"),
-        Column("error y, mm"),
-        Column("x and y on one scale, mm", scale.ticks),
-        Column("middle half x"),
-        Column("middle half y"),
-        Column("worst x"),
-        Column("worst y"),
+        *(Column(f"error {axis}, mm") for axis in axes),
+        Column(f"{listed(axes)} on one scale, mm" if axes else "error", scale.ticks, axes),
+        *(Column(f"middle half {axis}") for axis in axes),
+        *(Column(f"worst {axis}") for axis in axes),
         Column("thrust, N"),
         Column("variation, N/s"),
         Column("lost"),
@@ -50,66 +59,66 @@ def score_table(rows: Mapping[str, Row], refused: Mapping[str, str]) -> Table:
     ]
     body = []
     for name, row in rows.items():
-        errors = [row[each] for each in ERRORS]
-        halves = [float(interquartile_mean(row["per_episode"][each])) for each in ERRORS]
-        cells = [Cell(name, name, "" if row["competitor"] else "no competitor")]
-        cells += [Cell(mm(each["mean"]), each["mean"], interval(each)) for each in errors]
-        cells.append(Cell("", sum(each["mean"] for each in errors), marks=scale.marks(row)))
-        cells += [length(each) for each in halves]
-        cells += [length(each["worst"]) for each in errors]
+        errors = row.errors
+        halves = [interquartile_mean(row.per_episode[MAX_ERROR + axis]) for axis in axes]
+        cells = [Cell(name, name, "" if competes(row) else "no competitor")]
+        cells += [Cell(mm(e.mean), e.mean, interval(e)) for e in errors.values()]
+        cells.append(Cell("", row.total, marks=scale.marks(errors)))
+        cells += [length(float(half)) for half in halves]
+        cells += [length(error.worst) for error in errors.values()]
         for key in ("thrust_effort", "thrust_variation"):
-            cells.append(Cell(figures(row[key]["mean"]), row[key]["mean"]))
-        lost = row["failures"]
-        cells.append(Cell(str(lost), lost, alarm=lost > 0))
+            mean = row.metrics[key].mean
+            cells.append(Cell(figures(mean), mean))
+        cells.append(Cell(str(row.failures), row.failures, alarm=row.failures > 0))
         if decided:
-            cells.append(decision(row.get("beats_next")))
+            cells.append(decision(lead_of(row)))
         body.append(cells)
-    return Table(columns, body, [f"{name} is refused: {why}" for name, why in refused.items()])
+    return SortableTable(
+        columns, body, [f"{name} is refused: {why}" for name, why in refused.items()]
+    )
 
 
-def curve_table(curves: Mapping[str, Sequence[Row]]) -> Table:
+def curve_table(result: RobustnessResult) -> SortableTable:
     """Mean errors at each value of a quantity, a row for each policy and axis."""
-    values = [point["value"] for point in next(iter(curves.values()))]
     body = []
-    for name, points in curves.items():
-        for axis in "xy":
+    notes = []
+    for name, points in result.results.items():
+        for axis in result.axes:
             cells = [Cell(f"{name}, {axis}", f"{name}, {axis}")]
             for point in points:
-                if "refused" in point:
+                if isinstance(point, RefusedPoint):
                     cells.append(Cell("refused", math.inf, alarm=True))
                 else:
-                    error = point[f"max_error_{axis}"]
-                    cells.append(Cell(mm(error["mean"]), error["mean"], interval(error)))
+                    error = point.errors[axis]
+                    cells.append(Cell(mm(error.mean), error.mean, interval(error)))
             body.append(cells)
-    notes = [
-        f"{name} is refused at {point['value']:g}: {point['refused']}"
-        for name, points in curves.items()
-        for point in points
-        if "refused" in point
-    ]
-    titles = [Column(f"at {value:g}") for value in values]
-    return Table([Column("policy, axis"), *titles], body, notes)
+        notes += [
+            f"{name} is refused at {point.value:g}: {point.refused}"
+            for point in points
+            if isinstance(point, RefusedPoint)
+        ]
+    titles = [Column(f"at {value:g}") for value in result.values]
+    return SortableTable([Column("policy, axis"), *titles], body, notes)
 
 
-def paper_table(rows: Mapping[str, Row], paper: Mapping[str, Row]) -> Table:
+def paper_table(result: ReproductionResult) -> SortableTable:
     """Our Table 1 beside the paper's."""
-    columns = [Column("policy")]
-    columns += [Column(f"{part} {axis}, mm") for part in PARTS for axis in "xy"]
+    places = [(part, axis) for part in PARTS for axis in result.axes]
+    columns = [Column("policy"), *(Column(f"{part} {axis}, mm") for part, axis in places)]
     body = []
-    for name, row in rows.items():
+    for name, row in result.rows.items():
         cells = [Cell(name, name)]
-        for part in PARTS:
-            for axis in "xy":
-                ours, detail = row[part][axis], ""
-                if name in paper:
-                    printed = paper[name][part][axis]
-                    detail = f"paper {mm(printed)}, ratio {figures(ours / printed)}"
-                cells.append(Cell(mm(ours), ours, detail))
+        for part, axis in places:
+            ours, detail = row[part][axis], ""
+            if name in result.paper:
+                printed = result.paper[name][part][axis]
+                detail = f"paper {mm(printed)}, ratio {figures(ours / printed)}"
+            cells.append(Cell(mm(ours), ours, detail))
         body.append(cells)
-    return Table(columns, body)
+    return SortableTable(columns, body)
 
 
-def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> Table:
+def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
     """Under which conditions the episodes of each suite run, a row for each suite."""
     body = []
     for name, scenarios in suites.items():
@@ -130,7 +139,7 @@ def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> Table:
         cells.append(Cell(f"{low:g} to {high:g}", high - low))
         cells.append(Cell("yes" if moving else "none", float(moving)))
         body.append(cells)
-    return Table([Column(title) for title in CONDITIONS], body)
+    return SortableTable([Column(title) for title in CONDITIONS], body)
 
 
 class LogScale:
@@ -140,7 +149,7 @@ class LogScale:
         ticks: Decades in mm, and where they are, per cent.
     """
 
-    def __init__(self, errors: Sequence[Row]) -> None:
+    def __init__(self, errors: Iterable[Summary]) -> None:
         """Span means, intervals and worst episodes, m."""
         positive = [each for error in errors for each in _numbers(error) if each > 0] or [1e-3]
         self._low = math.log10(min(positive)) - 0.1
@@ -148,19 +157,18 @@ class LogScale:
         decades = range(math.ceil(self._low), math.floor(self._low + self._width) + 1)
         self.ticks = [(f"{10.0 ** (power + 3):g}", self._place(10.0**power)) for power in decades]
 
-    def marks(self, row: Row) -> dict[str, Mark]:
-        """Where a row's errors are, by axis."""
-        places = {name[-1]: map(self._place, _numbers(row[name])) for name in ERRORS}
-        return {axis: Mark(*each) for axis, each in places.items()}
+    def marks(self, errors: Mapping[str, Summary]) -> dict[str, Mark]:
+        """Where errors are, by axis."""
+        return {axis: Mark(*map(self._place, _numbers(each))) for axis, each in errors.items()}
 
     def _place(self, metres: float) -> float:
         power = math.log10(metres) if metres > 0 else self._low
         return round(100 * (power - self._low) / self._width, 2)
 
 
-def interval(score: Row) -> str:
+def interval(error: Summary) -> str:
     """The 95 % interval of a length, mm."""
-    low, high = score["ci95"]
+    low, high = error.ci95
     return f"[{mm(low)}, {mm(high)}]"
 
 
@@ -169,13 +177,13 @@ def length(metres: float) -> Cell:
     return Cell(mm(metres), metres)
 
 
-def decision(beats: Row | None) -> Cell:
+def decision(lead: Lead | None) -> Cell:
     """Whether a row is better than the next, and with what probability in an episode."""
-    if beats is None:
+    if lead is None:
         return Cell("", -1.0)
-    return Cell(said(beats), beats["probability"], f"{beats['probability']:.2f}")
+    return Cell(in_short(lead), lead.probability, f"{lead.probability:.2f}")
 
 
-def _numbers(error: Row) -> tuple[float, float, float, float]:
-    low, high = error["ci95"]
-    return low, error["mean"], high, error["worst"]
+def _numbers(error: Summary) -> tuple[float, float, float, float]:
+    low, high = error.ci95
+    return low, error.mean, high, error.worst

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from usm_cli.report.tables import ERRORS, Row
+from usm_baselines.benchmark.results import Scores
+
+from usm_cli.report.tables import competes
 from usm_gym.statistics import FEWEST_EPISODES
-from usm_gym.support.text import mm
+from usm_gym.support.text import listed, mm
 from usm_gym.task.metrics import RECOVERY
 from usm_gym.task.scenario import Scenario
 
@@ -14,50 +16,45 @@ from usm_gym.task.scenario import Scenario
 PAPERS = "sta"
 
 
-def total(row: Row) -> float:
-    """What rows are ordered by: the mean errors in x and y, m."""
-    return sum(float(row[name]["mean"]) for name in ERRORS)
+def in_axes(row: Scores, metric: str) -> str:
+    """The mean of a metric in each axis, in words."""
+    return listed([f"{mm(each.mean)} mm in {axis}" for axis, each in row.by_axis(metric).items()])
 
 
-def pair(row: Row, score: str) -> str:
-    """Mean errors in x and y in words."""
-    x, y = (mm(row[f"{score}_{axis}"]["mean"]) for axis in "xy")
-    return f"{x} mm in x and {y} mm in y"
-
-
-def competitors(rows: Mapping[str, Row]) -> dict[str, Row]:
+def competitors(rows: Mapping[str, Scores]) -> dict[str, Scores]:
     """The rows of those that are told no more than a vehicle knows and lost no robot."""
-    return {name: row for name, row in rows.items() if row["competitor"] and row["failures"] == 0}
+    return {name: row for name, row in rows.items() if competes(row) and row.failures == 0}
 
 
-def motion(rows: Mapping[str, Row]) -> str:
+def motion(rows: Mapping[str, Scores]) -> str:
     """What the joint motion does to the controller that it harms most."""
-    known = competitors(rows)
+
+    def calm(row: Scores) -> float:
+        return sum(each.mean for each in row.by_axis("settled_error").values())
+
+    known = {name: row for name, row in competitors(rows).items() if calm(row) > 0}
     if not known:
         return ""
-
-    def calm(row: Row) -> float:
-        return sum(float(row[f"settled_error_{axis}"]["mean"]) for axis in "xy")
-
-    name, row = max(known.items(), key=lambda pair: total(pair[1]) / calm(pair[1]))
+    name, row = max(known.items(), key=lambda pair: pair[1].total / calm(pair[1]))
     return (
-        f"With {name} the error reaches {pair(row, 'max_error')}, but only "
-        f"{pair(row, 'settled_error')} outside the {RECOVERY:g} s after each motion of the joints."
+        f"With {name} the error reaches {in_axes(row, 'max_error')}, but only "
+        f"{in_axes(row, 'settled_error')} outside the {RECOVERY:g} s after each motion of the "
+        "joints."
     )
 
 
-def verdict(rows: Mapping[str, Row], episodes: int) -> str:
+def verdict(rows: Mapping[str, Scores], episodes: int) -> str:
     """Which controller copes best, beside the paper's."""
     known = competitors(rows)
     if not known:
         return ""
-    best = min(known, key=lambda name: total(known[name]))
+    best = min(known, key=lambda name: known[name].total)
     said = (
-        f"The best, {best}, keeps it to {pair(known[best], 'max_error')}, mean of {episodes} "
+        f"The best, {best}, keeps it to {in_axes(known[best], 'max_error')}, mean of {episodes} "
         f"episodes{'' if episodes >= FEWEST_EPISODES else ', too few for a conclusion'}."
     )
     if PAPERS in rows and best != PAPERS:
-        said += f" The paper's {PAPERS} comes to {pair(rows[PAPERS], 'max_error')}."
+        said += f" The paper's {PAPERS} comes to {in_axes(rows[PAPERS], 'max_error')}."
     return said
 
 

@@ -1,10 +1,10 @@
-"""Where the machine code of kernels is kept.
+"""Keeps the machine code of kernels.
 
-The folder of a kernel is named after the sources it was made from: the file of the kernel and those
-of all modules that it imports, directly or not. numba's own cache looks at the kernel's file alone
-and would serve stale code after an edit of a helper.
+The folder of a kernel is named after a hash of its sources: the file of the kernel and the files of
+all modules that it imports, directly or not. numba's own cache looks only at the kernel's file and
+would serve stale code after an edit of a helper.
 
-numba's cache is made of pickles, so whoever can write in its folder can run code as the user.
+numba's cache consists of pickles, so whoever can write in its folder can run code as the user.
 """
 
 from __future__ import annotations
@@ -56,18 +56,18 @@ def keep(kernel: Any, function: Callable[..., Any]) -> None:
 
 
 def sources(file: Path, module: str) -> frozenset[Path]:
-    """The file of a module and those of all modules of ours that it imports, directly or not.
+    """The files of a module and of all our modules that it imports, directly or not.
 
     Ours are the modules of packages that have kernels, and those in the folder of the file.
     """
-    found, waiting = {file}, [(file, module)]
+    files, waiting = {file}, [(file, module)]
     while waiting:
         for name, imported in imports(*waiting.pop()):
             ours = name.partition(".")[0] in _packages or imported.parent == file.parent
-            if ours and imported not in found:
-                found.add(imported)
+            if ours and imported not in files:
+                files.add(imported)
                 waiting.append((imported, name))
-    return frozenset(found)
+    return frozenset(files)
 
 
 @cache
@@ -99,12 +99,11 @@ def digest(file: Path) -> str:
 def cache_folder(files: frozenset[Path]) -> str | None:
     """Find a writable folder for machine code that is made from some files.
 
-    `NUMBA_CACHE_DIR` is used where it is set, then the user's cache folder, then a folder of the
-    user's in the temporary directory.
+    The first choice is `NUMBA_CACHE_DIR`, if it is set, then the user's cache folder, then a folder
+    in the temporary directory.
 
     Returns:
-        The folder, or None after a warning if there is none: kernels then compile anew in each
-        process.
+        The folder, or None after a warning: kernels are then compiled again in every process.
     """
     fingerprint = hashlib.sha256(" ".join(sorted(map(digest, files))).encode()).hexdigest()
     for base in _bases():
@@ -122,13 +121,15 @@ def cache_folder(files: frozenset[Path]) -> str | None:
 
 
 class _CacheFile(IndexDataCacheFile):
-    """The files of a kernel; one that is damaged counts as missing, and is written anew."""
+    """The files of a kernel; a damaged one counts as missing and is written again."""
 
     def _load_index(self) -> dict[Any, str]:
         try:
             index: dict[Any, str] = super()._load_index()
             return index
-        except Exception as error:  # what is no pickle may raise anything
+        except (AttributeError, ImportError):
+            return {}  # of a version in which the type of an argument stood elsewhere
+        except Exception as error:  # a damaged pickle may raise anything
             _discard(self._index_path, error)
             return {}
 
@@ -136,14 +137,14 @@ class _CacheFile(IndexDataCacheFile):
         try:
             return super()._load_data(name)
         except OSError:
-            raise  # numba's own way of finding that it is missing
+            raise  # numba's own sign that it is missing
         except Exception as error:
             _discard(self._data_path(name), error)
             return None
 
 
 class _Cache(FunctionCache):
-    """numba's cache of a kernel, which damaged files do not stop."""
+    """numba's cache of a kernel, which survives damaged files."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
@@ -152,6 +153,15 @@ class _Cache(FunctionCache):
             filename_base=self._impl.filename_base,
             source_stamp=self._impl.locator.get_source_stamp(),
         )
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        """Tell named tuples apart by their fields, too: kernels may not import their modules."""
+        return (*super()._index_key(sig, codegen), *map(_fields, sig))
+
+
+def _fields(kind: Any) -> tuple[Any, ...]:
+    """Names of the fields of an argument's type, and of the types within it."""
+    return (*getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
 
 
 def _discard(path: str, error: Exception) -> None:
@@ -163,11 +173,11 @@ def _discard(path: str, error: Exception) -> None:
 
 
 def _bases() -> Iterator[Path]:
-    """Where there may be a cache, each looked up only if those before it do not serve.
+    """Possible places of a cache; a place is looked up only if those before it cannot be used.
 
-    Not every user has a home, nor every machine a temporary directory. Others write in that one,
-    too, so each folder on the way down is checked, from the root on: none can be exchanged once
-    those above it have passed. The other two are places that the user trusts.
+    Not every user has a home, and not every machine a temporary directory. Others can write in the
+    temporary directory, so all folders on the way to it are checked from the root down: nobody can
+    exchange a folder once those above it have passed. The user trusts the other two places.
     """
     if numba.config.CACHE_DIR:
         yield Path(numba.config.CACHE_DIR)
@@ -183,24 +193,24 @@ def _bases() -> Iterator[Path]:
 
 
 def _owned(folder: Path) -> bool:
-    """Whether it is a folder, not a link to one, in which the user alone can write."""
-    found = folder.lstat()
+    """Whether it is a folder, not a link to one, in which only the user can write."""
+    status = folder.lstat()
     if _user() is None:
-        return stat.S_ISDIR(found.st_mode)
-    shared = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == _user() and not shared
+        return stat.S_ISDIR(status.st_mode)
+    shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == _user() and not shared
 
 
 def _guarded(folder: Path) -> bool:
-    """Whether root and the user alone can exchange what they have put into a folder."""
+    """Whether only root and the user can exchange what they have put into a folder."""
     if _user() is None:
         return True
-    found = folder.lstat()
-    shared = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    status = folder.lstat()
+    shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
     return (
-        stat.S_ISDIR(found.st_mode)
-        and found.st_uid in (0, _user())
-        and bool(not shared or found.st_mode & stat.S_ISVTX)
+        stat.S_ISDIR(status.st_mode)
+        and status.st_uid in (0, _user())
+        and bool(not shared or status.st_mode & stat.S_ISVTX)
     )
 
 

@@ -13,7 +13,7 @@ from usm_gym.task.scenario import Scenario
 
 Frame = NDArray[np.uint8]
 
-# Okabe and Ito's colours, which the colour-blind tell apart, and tints of them.
+# The colours of Okabe and Ito, which colour-blind people can tell apart, and tints of them.
 GREY, FAINT, RULE, WATER = (96, 110, 118), (222, 230, 235), (200, 210, 217), (243, 248, 251)
 ERROR_COLOURS = ((0, 114, 178), (213, 94, 0))
 BODY, BODY_EDGE = (203, 215, 224), (84, 104, 120)
@@ -39,7 +39,7 @@ GRID = 0.5
 ARROW, ARROW_AREA = np.array([615.0, 40.0]), pygame.Rect(602, 28, 26, 24)
 # Length of a jet at the thruster's limit, m.
 JET_LENGTH = 0.36
-# How much of the past is seen in the lens, s.
+# How much of the past the lens shows, s.
 LENS_PAST = 2.0
 SCALES = tuple(digit * 10.0**power for power in (-4, -3, -2, -1, 0) for digit in (1, 2, 5))
 # Superellipses, tail to head: the outline of a link over its half length and half width.
@@ -51,7 +51,7 @@ HEAD_LINK = np.where(_COS[:, np.newaxis] > 0, np.stack([1.35 * _COS, _SIN], axis
 
 
 def error_scale(errors: Points) -> float:
-    """The round number, m, up to which charts of these errors, m, reach."""
+    """The round number, m, that limits charts of these errors, m."""
     largest = 1.02 * float(np.abs(errors).max(initial=0.0))
     return next((scale for scale in SCALES if scale >= largest), SCALES[-1])
 
@@ -74,9 +74,9 @@ class Canvas:
         """Draw a picture.
 
         Args:
-            picture: What is to be seen.
-            title: What is written above it.
-            scale: Up to which error lens and chart reach, m; None fits the errors so far.
+            picture: The picture.
+            title: The words above it.
+            scale: The largest error in lens and chart, m; None fits the errors so far.
 
         Returns:
             Red, green and blue, (height, width, 3).
@@ -95,7 +95,7 @@ class Canvas:
         return pixels
 
     def _draw_still_parts(self, scenario: Scenario, scale: float) -> None:
-        """What all frames of an episode share."""
+        """Draw what all frames of an episode share."""
         self._frame.fill(PAPER)
         self._legend(scenario)
         self._empty_lens(scale)
@@ -133,7 +133,7 @@ class Canvas:
         self._arrow.show(self._frame)
 
     def _swimming(self, picture: Picture) -> None:
-        """The robot on its way."""
+        """Draw the robot and its path."""
         scene = self._scene
         scene.clear()
         self._centre = picture.path[picture.instants[-1]]
@@ -173,7 +173,7 @@ class Canvas:
         self._scene.disc(centres[-1] + 0.45 * (centres[-1] - centres[-2]), 3.0, HEAD_EDGE)
 
     def _jets(self, picture: Picture) -> None:
-        """Water leaves a thruster against its force, beside the body."""
+        """Draw the water that leaves a thruster, against its force and beside the body."""
         robot, body = picture.robot, picture.body
         for link, normal, thrust in zip(
             robot.thruster_links, robot.thruster_is_normal, picture.thrust, strict=True
@@ -188,7 +188,7 @@ class Canvas:
                 _draw_jet(self._scene, self._in_scene(start), flow * (1, -1), breadth)
 
     def _path_dots(self, path: Points) -> Points:
-        """Points on a path every 4 cm, kept as long as the path is the same."""
+        """Points on a path every 4 cm, computed again only for another path."""
         if path is not self._path:
             self._path = path
             length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
@@ -261,7 +261,7 @@ class Canvas:
         self._chart.show(self._frame)
 
     def _legend(self, scenario: Scenario) -> None:
-        """What the signs mean; each sign is drawn left of its name."""
+        """Draw the symbols, with their names to the right of them."""
         limit = scenario.conditions.thruster_limit
         jet = 0.5 * JET_LENGTH * METRE
         signs = [("head", 16), ("centre of mass", 14), ("path", 20), ("track", 18)]
@@ -297,7 +297,7 @@ class Canvas:
 
 
 def _draw_jet(panel: Panel, start: Points, flow: Points, breadth: float = 1.0) -> None:
-    """A jet from a point of the canvas; a flow of length one is that at the limit."""
+    """Draw a jet from a point of the canvas; a flow of length one is that at the limit."""
     strength = np.hypot(*flow)
     if strength < 0.01:
         return
@@ -323,7 +323,7 @@ def _links(picture: Picture, posture: Posture) -> Points:
 
 
 def _thinned(points: Points, most: int = 4000) -> Points:
-    """At most so many of the points, and the last; which ones hardly changes as they grow."""
+    """Keep at most `most` of the points and the last; few choices change as points are added."""
     stride = -(-len(points) // most)
     return points if stride == 1 else np.concatenate([points[::stride], points[-1:]])
 

@@ -1,4 +1,4 @@
-"""Smooth lines, shapes and words on a frame (needs the extra `render`)."""
+"""Draws smooth lines, shapes and words on a frame (needs the extra `render`)."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ Points = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 INK, PAPER = (38, 50, 56), (255, 255, 255)
-# Each panel is drawn so many times as large and scaled down, which smooths all edges; words are
-# smooth by themselves.
+# A panel is drawn larger by this factor and scaled down, which smooths all edges; words are already
+# smooth.
 OVER = 2
 LEFT, MIDDLE, RIGHT = 0.0, 0.5, 1.0
 
 
 class Panel:
-    """A part of a frame. Places and widths are in points of the frame, whatever its size."""
+    """A part of a frame; places and widths are in points, which do not depend on its size."""
 
     def __init__(self, area: pygame.Rect, unit: float, colour: Colour = PAPER) -> None:
         """Prepare to draw on an area, in points of `unit` pixels, over a colour."""
         self._area = area
         self._scale = OVER * unit
-        self._pixels = pygame.Rect([round(unit * each) for each in area])
+        self._pixels = pygame.Rect([round(unit * side) for side in area])
         width, height = self._pixels.size
         self._surface = pygame.Surface((OVER * width, OVER * height))
         self._surface.fill(colour)
         self._background = self._surface.copy()
 
     def keep(self) -> None:
-        """Make what has been drawn the background."""
+        """Turn the drawing so far into the background."""
         self._background.blit(self._surface, (0, 0))
 
     def clear(self) -> None:
-        """Leave nothing but the background."""
+        """Erase everything except the background."""
         self._surface.blit(self._background, (0, 0))
 
     def show(self, frame: pygame.Surface) -> None:
-        """Put it in its place on a frame."""
+        """Copy the panel to its place on a frame."""
         place = frame.subsurface(self._pixels)
         pygame.transform.smoothscale(self._surface, place.get_size(), place)
 
     def disc(self, at: Points, radius: float, colour: Colour) -> None:
-        """Draw a disc, or one at each of several points."""
+        """Draw a disc at one or several points."""
         for middle in np.atleast_2d(self._at(at)).tolist():
             pygame.draw.circle(self._surface, colour, middle, radius * self._scale)
 
@@ -84,7 +84,7 @@ class Panel:
         pygame.draw.rect(self._surface, colour, pygame.Rect(corner, size))
 
     def centre_of_mass(self, at: Points) -> None:
-        """Draw the usual sign: a disc in quarters."""
+        """Draw the usual symbol of a centre of mass, a disc in quarters."""
         radius = 6.0
         self.disc(at, radius + 1.2, INK)
         self.disc(at, radius, PAPER)
@@ -108,7 +108,7 @@ def write(
     colour: Colour,
     align: float = LEFT,
 ) -> float:
-    """Write words on a frame, in points of `unit` pixels; tells where they end."""
+    """Write words on a frame, in points of `unit` pixels; return where they end."""
     image = _words(text, round(size * unit), colour)
     x = at[0] * unit - align * image.get_width()
     frame.blit(image, (round(x), round(at[1] * unit)))
@@ -117,12 +117,12 @@ def write(
 
 @lru_cache(maxsize=128)
 def _words(text: str, size: int, colour: Colour) -> pygame.Surface:
-    # Fonts are not kept: they die with anybody's `pygame.quit()`, surfaces do not.
+    # A font does not survive somebody's `pygame.quit()`, but a surface does, so only that is kept.
     pygame.font.init()
     return pygame.font.Font(io.BytesIO(_typeface()), size).render(text, True, colour)
 
 
 @cache
 def _typeface() -> bytes:
-    # From memory, for a font keeps its file open.
+    # Read into memory, because a font would keep its file open.
     return (Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf").read_bytes()

@@ -1,4 +1,4 @@
-"""What there is to see of a robot, as plain data: taken from a simulation, drawn by `rendering`."""
+"""The visible state of a robot as plain data, taken from a simulation and drawn by `rendering`."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from usm_gym.simulation import Simulation
 from usm_gym.task.scenario import Scenario
 
 Array = NDArray[np.float64]
-# A robot that is lost may be anywhere; it is shown no further than this from its reference, m.
+# A lost robot may be anywhere; it is shown at most this far from its reference, m.
 FAR = 10.0
 
 
 @dataclass(frozen=True)
 class Posture:
-    """Where the links are.
+    """The places and angles of the links.
 
     Attributes:
         centres: Centres of the links, tail first, m, (links, 2).
@@ -43,7 +43,7 @@ class Picture:
         thrust: Forces of the thrusters over their limit, (thrusters,).
         current: Velocity of the water, m/s, (2,).
         path: Reference of the centre of mass at every control instant of the episode, m, (k, 2).
-        instants: Which of these instants have been seen so far, rising, the last of them now.
+        instants: The instants recorded so far, in ascending order; the last one is now.
         errors: True position errors at these instants, m, (len(instants), 2).
         max_error: Largest absolute error after settling, m, (2,).
         lost: Whether the robot is lost.
@@ -64,7 +64,7 @@ class Picture:
 
 
 class Recorder:
-    """Remembers what one robot of a simulation has done, for pictures with a past."""
+    """Records the past of one robot of a simulation, for pictures with a trail."""
 
     def __init__(self, index: int = 0) -> None:
         """Follow the robot `index`."""
@@ -72,7 +72,7 @@ class Recorder:
         self._scenario: Scenario | None = None
 
     def note(self, simulation: Simulation) -> None:
-        """Remember the present; to be called at every control instant that a trail shall show."""
+        """Record the present; call it at every control instant that a trail should show."""
         scenario, count = simulation.scenarios[self._index], simulation.count[self._index]
         if scenario is not self._scenario or count == 0:
             self._scenario = scenario

@@ -1,4 +1,4 @@
-"""What an environment renders with: its render modes, and the robots it shows."""
+"""Renders an environment: its render modes, and the robots that it shows."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ RENDER_MODES = ("human", "rgb_array")
 class Viewer:
     """Shows one robot of a simulation in a window, or all robots as images.
 
-    Nothing is drawn, and pygame is not imported, before the first `render`. Canvas and window stay
-    behind when an environment is pickled or copied; the copy makes its own.
+    Nothing is drawn, and pygame is not imported, before the first `render`. A pickle or a copy of
+    an environment has no canvas and no window; it makes its own.
 
     Attributes:
         mode: The render mode, "human" or "rgb_array".
@@ -46,14 +46,14 @@ class Viewer:
         return {**self.__dict__, "_canvas": None, "_window": None}
 
     def follow(self, simulation: Simulation) -> None:
-        """Take note of a control instant; a window shows it at once."""
+        """Record a control instant; a window shows it at once."""
         for recorder in self._recorders:
             recorder.note(simulation)
         if self.mode == "human":
             self.render(simulation)
 
     def render(self, simulation: Simulation) -> tuple[NDArray[np.uint8], ...] | None:
-        """An image of the present for each robot, (height, width, 3); None with a window.
+        """Draw the present: one image per robot, (height, width, 3); None with a window.
 
         Raises:
             gymnasium.error.DependencyNotInstalled: Without the extra `render`.
@@ -63,7 +63,9 @@ class Viewer:
         if self._window is not None and self._window.closed:
             return None
         pictures = [recorder.picture(simulation) for recorder in self._recorders]
-        images = tuple(self._canvas.draw(each, f"{each.scenario.mode} mode") for each in pictures)
+        images = tuple(
+            self._canvas.draw(picture, f"{picture.scenario.mode} mode") for picture in pictures
+        )
         if self._window is None:
             return images
         self._window.show(images[0], 1 / pictures[0].scenario.conditions.control_period)

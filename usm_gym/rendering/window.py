@@ -12,17 +12,17 @@ import pygame
 
 
 class Window:
-    """A window that shows frames; closing it by hand makes `show` do nothing from then on."""
+    """A window that shows frames; once the user has closed it, `show` does nothing."""
 
     def __init__(self, size: tuple[int, int], title: str) -> None:
-        """Open it."""
+        """Open the window."""
         self._size, self._title = size, title
         self._clock = pygame.time.Clock()
         self._open()
 
     @property
     def closed(self) -> bool:
-        """Whether it is gone."""
+        """Whether the window has been closed."""
         return self._window not in _windows
 
     def show(self, frame: NDArray[np.uint8], fps: float) -> None:
@@ -43,7 +43,7 @@ class Window:
         self._clock.tick(fps)
 
     def close(self) -> None:
-        """Close it, and with the last one the connection to the display."""
+        """Close the window, and the connection to the display with the last one."""
         _close(self._window)
 
     def _open(self) -> None:
@@ -57,7 +57,7 @@ _windows: set[pygame.Window] = set()
 
 
 def has_display() -> bool:
-    """Whether a window could be seen; elsewhere they are drawn into memory."""
+    """Whether there is a display; without one, windows are drawn into memory."""
     pygame.display.init()
     try:
         return pygame.display.get_driver() != "offscreen"
@@ -67,7 +67,7 @@ def has_display() -> bool:
 
 
 def _is_dead(window: pygame.Window) -> bool:
-    """Whether somebody's `pygame.quit()` has taken it away."""
+    """Whether somebody's `pygame.quit()` has destroyed the window."""
     try:
         return not window.id
     except pygame.error:

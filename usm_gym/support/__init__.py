@@ -1,1 +1,1 @@
-"""What has nothing to do with robots: files, validation, seeds, processes, provenance."""
+"""Everything that is not about robots: files, validation, seeds, processes, provenance."""

@@ -1,4 +1,4 @@
-"""Files: read only if they are what we expect, written whole or not at all."""
+"""Files: read only if they are regular, and written completely or not at all."""
 
 from __future__ import annotations
 
@@ -15,68 +15,83 @@ from typing import Any
 
 from filelock import FileLock, Timeout, lock_descriptor
 
-from usm_gym.support.validation import clipped, require
+from usm_gym.support.validation import UsageError, clipped, require
 
-# Nothing that the packages read is larger, bytes.
+# The packages read no larger file, bytes.
 LARGEST = 512 * 2**20
 
 
 def read_bytes(path: str | Path, largest: int = LARGEST, links: bool = True) -> bytes:
-    """Read a regular file; a pipe or a device is refused, and never waited for.
+    """Read a regular file; refuse a pipe or a device instead of waiting for it.
 
     Args:
         path: The file.
-        largest: How many bytes it may have.
+        largest: The largest size allowed, bytes.
         links: Whether it may be a symbolic link.
 
     Raises:
-        ValueError: If it is no regular file, too large, or a symbolic link where none is allowed.
+        ValueError: If it is not a regular file, is too large, or is a link where none is allowed.
         OSError: If it cannot be read.
     """
     name = f"file {path}"
     require(links or not Path(path).is_symlink(), name, "a symbolic link", "a regular file")
-    # Without O_NONBLOCK the opening of a pipe would wait for somebody to write.
+    # Without O_NONBLOCK, opening a pipe would wait for a writer.
     flags = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     flags |= 0 if links else getattr(os, "O_NOFOLLOW", 0)
     with open(os.open(path, os.O_RDONLY | flags), "rb") as file:
-        found = os.fstat(file.fileno())
-        require(stat.S_ISREG(found.st_mode), name, stat.filemode(found.st_mode), "a regular file")
-        require(found.st_size <= largest, name, f"{found.st_size} bytes", f"up to {largest} bytes")
+        status = os.fstat(file.fileno())
+        require(stat.S_ISREG(status.st_mode), name, stat.filemode(status.st_mode), "a regular file")
+        require(
+            status.st_size <= largest, name, f"{status.st_size} bytes", f"up to {largest} bytes"
+        )
         return file.read(largest)
+
+
+def read_text(path: str | Path) -> str:
+    """Read a file of text in UTF-8.
+
+    Raises:
+        ValueError: If it is none, or no file as `read_bytes` takes it.
+        OSError: If it cannot be read.
+    """
+    try:
+        return read_bytes(path).decode()
+    except UnicodeDecodeError as error:
+        raise UsageError(f"file {path} is no text in UTF-8: {error}") from error
 
 
 def read_json(path: str | Path, links: bool = True) -> Any:
     """Read a file of JSON.
 
     Raises:
-        ValueError: If it holds no JSON, or is no file as `read_bytes` takes it.
+        ValueError: If it is not JSON, or `read_bytes` refuses it.
         OSError: If it cannot be read.
     """
     return parse_json(read_bytes(path, links=links), f"file {path}")
 
 
 def parse_json(text: str | bytes, name: str) -> Any:
-    """Parse JSON; `name` says in errors what it is.
+    """Parse JSON; `name` stands for it in errors.
 
     Raises:
-        ValueError: If it is no JSON, or nested too deeply to be read.
+        ValueError: If it is not JSON, or is nested too deeply.
     """
     try:
         return json.loads(text)
     except RecursionError as error:
-        raise ValueError(f"{clipped(name)} is nested too deeply") from error
-    except ValueError as error:
-        raise ValueError(f"{clipped(name)} is no JSON: {clipped(str(error))}") from error
+        raise UsageError(f"{clipped(name)} is nested too deeply") from error
+    except ValueError as error:  # of JSON, Unicode or an integer of too many digits
+        raise UsageError(f"{clipped(name)} is no JSON: {clipped(str(error))}") from error
 
 
 def check_writable(path: str | Path) -> None:
-    """Raise `OSError` now if a file could not be written later."""
+    """Raise `OSError` at once if a file cannot be written later."""
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(f"cannot write {target}: it is a directory")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"cannot write {target}: there is no directory {target.parent}")
-    # A device would be replaced by the file.
+    # Otherwise the file would replace a device.
     if target.exists() and not target.is_file():
         raise OSError(f"cannot write {target}: it is there, and no regular file")
     try:
@@ -88,11 +103,11 @@ def check_writable(path: str | Path) -> None:
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Give a new file to write instead of `path`, whose place it takes at the end, in one move.
+    """Give a new file, with the suffix of `path`, that replaces `path` in one move at the end.
 
-    Readers, an interruption and a power cut see the old or the new one. The new one has the same
-    suffix. Parts that killed writers of `path` have left are removed. A part that is still being
-    written never is: its writer has locked it, and the system unlocks it only when the writer ends.
+    After an interruption or a power cut, `path` is either the old file or the new one. Parts left
+    by killed writers of `path` are removed, but never one that is still being written: its writer
+    has locked it, and the system unlocks it only when the writer ends.
     """
     target = Path(path)
     _remove_dead_parts(target)
@@ -114,7 +129,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Name a file in errors of the system that name none, such as that of a full disk."""
+    """Add a file's name to system errors without one, such as that of a full disk."""
     try:
         yield
     except OSError as error:
@@ -125,10 +140,10 @@ def naming(path: Path) -> Iterator[None]:
 
 @contextmanager
 def holding(path: str | Path) -> Iterator[None]:
-    """Keep an output, a file or a folder, from all others that would hold it at the same time.
+    """Reserve an output, a file or a folder, for this process.
 
-    The system locks a file, `.lock` in the folder or `.NAME.lock` beside the file, and unlocks it
-    when the process ends, however it ends: what a killed one leaves keeps nobody out.
+    The system locks a file, `.lock` in the folder or `.NAME.lock` beside the file. It unlocks it
+    when the process ends, however it ends, so a killed process keeps nobody out.
 
     Raises:
         BlockingIOError: If another process holds the output.
@@ -145,21 +160,21 @@ def holding(path: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # Still locked: whoever has opened it meanwhile finds that it has no name any more. Windows
-        # keeps a file that is open.
+        # Unlinked while it is locked: whoever has opened it meanwhile sees that its name is gone.
+        # Windows does not remove an open file.
         with suppress(PermissionError):
             file.unlink(missing_ok=True)
         lock.release()
 
 
 def sync(file: Path) -> None:
-    """Wait until what a file holds would survive a power cut."""
+    """Wait until the content of a file would survive a power cut."""
     with open(file, "rb") as written:
         os.fsync(written.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder would survive a power cut, where the system can do that."""
+    """Wait until the names in a folder would survive a power cut, if the system supports that."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -169,7 +184,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def move_folder(part: Path, target: Path) -> None:
-    """Give a finished folder its name, a new one, in one move that survives a power cut."""
+    """Rename a finished folder in one move that survives a power cut."""
     for file in part.iterdir():
         sync(file)
     sync_folder(part)
@@ -178,7 +193,7 @@ def move_folder(part: Path, target: Path) -> None:
 
 
 def remove_folder(folder: Path) -> None:
-    """Remove a folder with all that is in it, if it is there."""
+    """Remove a folder and its content, if it exists."""
     with suppress(FileNotFoundError):
         shutil.rmtree(folder)
 
@@ -208,7 +223,7 @@ def _umask() -> int:
 def _new_part(target: Path) -> tuple[int | None, Path]:
     """Make an empty part of a file, locked until the handle is closed.
 
-    On Windows, where an open file can be neither moved nor written by others, it has no lock.
+    It has no lock on Windows, where nobody else can move or write an open file.
     """
     while True:
         handle, name = tempfile.mkstemp(
@@ -219,25 +234,25 @@ def _new_part(target: Path) -> tuple[int | None, Path]:
             return None, Path(name)
         if _locked(handle) and os.fstat(handle).st_nlink > 0:
             return handle, Path(name)
-        os.close(handle)  # another writer took it for dead before it was locked
+        os.close(handle)  # another writer removed it as dead before it was locked
 
 
 def _locked(handle: int) -> bool:
     try:
         return lock_descriptor(handle, blocking=False)
-    except OSError:  # the file system has no locks: nobody will take it for dead
+    except OSError:  # the file system has no locks, so nobody removes it as dead
         return True
 
 
 def _remove_dead_parts(target: Path) -> None:
     if os.name == "nt":
-        return  # nothing tells a dead part from one that is being written
+        return  # a dead part looks like one that is being written
     pattern = f"{glob.escape(target.stem)}.part????????{glob.escape(target.suffix)}"
     for part in target.parent.glob(pattern):
         with suppress(OSError):
             handle = os.open(part, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
             try:
                 if lock_descriptor(handle, blocking=False):
-                    part.unlink()  # while it is locked, so that nobody begins to write it
+                    part.unlink()  # while it is locked, so that nobody starts to write it
             finally:
                 os.close(handle)

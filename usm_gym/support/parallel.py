@@ -1,4 +1,4 @@
-"""Independent tasks through joblib: processes here, or whatever backend is active."""
+"""Runs independent tasks through joblib, in local processes or on the active backend."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import joblib
 
 T = TypeVar("T")
 
-# Tasks for each worker between two waits for all, where the active backend (Ray's) cannot hand over
+# Tasks per worker between two waits for all of them, for backends (Ray's) that cannot return
 # results one by one.
 SHARE = 4
 
@@ -22,15 +22,15 @@ SHARE = 4
 def results(
     function: Callable[..., T], tasks: Sequence[tuple[Any, ...]], workers: int
 ) -> Iterator[tuple[int, T]]:
-    """Call a function with the arguments of each task.
+    """Call a function once per task.
 
     Args:
-        function: What to call; for more than one worker it is pickled, like its arguments.
-        tasks: The arguments of each call.
+        function: The function; with more than one worker it is pickled, like its arguments.
+        tasks: The arguments of the calls.
         workers: Number of processes; 1 means this one.
 
     Yields:
-        The index of a task and its result, in the order in which they are done.
+        The index of a task and its result, in the order in which tasks end.
 
     Raises:
         ChildProcessError: If a worker process ends before its task is done.
@@ -55,7 +55,7 @@ def results(
 
 
 def _streamed(calls: Sequence[Any], workers: int) -> Iterator[Any]:
-    """Results one by one; whoever wants no more of them stops the workers."""
+    """Yield results one by one; closing the generator stops the workers."""
     outcomes: Any = None
     try:
         with _sheltered_from_ctrl_c():
@@ -70,9 +70,9 @@ def _streamed(calls: Sequence[Any], workers: int) -> Iterator[Any]:
 
 @contextmanager
 def _sheltered_from_ctrl_c() -> Iterator[None]:
-    """Start processes that Ctrl-C does not reach, though the terminal sends it to all.
+    """Start processes that Ctrl-C does not reach, although the terminal sends it to all.
 
-    They inherit that SIGINT is blocked, as do the threads which start others in their place.
+    They inherit the blocked SIGINT, and so do the threads that replace them.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -81,7 +81,7 @@ def _sheltered_from_ctrl_c() -> Iterator[None]:
 
     from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
-    # These unblock it when they have started; so they start first.
+    # The trackers unblock SIGINT when they start, so they start first.
     resource_tracker.ensure_running()
     loky_tracker.ensure_running()
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -1,4 +1,4 @@
-"""Where a result comes from: versions, commit, command."""
+"""Says where a result comes from: versions, commit, command."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def provenance(seeds: Any) -> dict[str, Any]:
     """Describe how a result was made.
 
     Args:
-        seeds: The seeds it depends on, or what they came from.
+        seeds: The seeds on which it depends, or their origin.
     """
     packages = {name: known for name in PACKAGES if (known := _version(name)) is not None}
     return {
@@ -25,8 +25,13 @@ def provenance(seeds: Any) -> dict[str, Any]:
         "commit": _commit(),
         "packages": {"python": platform.python_version(), **packages},
         "seeds": seeds,
-        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "command": _text(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])),
     }
+
+
+def _text(argument: str) -> str:
+    """An argument as text: bytes that are none, which a shell can pass, are written as escapes."""
+    return argument.encode(errors="backslashreplace").decode()
 
 
 def _version(package: str) -> str | None:
@@ -37,7 +42,7 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """Commit of the checkout that the package runs from; None where it runs from elsewhere."""
+    """The commit of the checkout from which the package runs; None if there is no checkout."""
     package = sys.modules[__name__.partition(".")[0]]
     root = Path(str(package.__file__)).resolve().parents[1]
     if not (root / ".git").exists():

@@ -1,4 +1,4 @@
-"""Streams of random numbers: one for each purpose, so that none ever meets another."""
+"""Streams of random numbers, one per purpose, which never overlap."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ SUITE, EVALUATION, TRAINING, TUNING, VALIDATION = range(5)
 
 
 def stream(seed: int, purpose: int, *index: int) -> np.random.Generator:
-    """The stream of a purpose, and of an episode of it, under a seed."""
+    """Give the stream of a purpose, or of one of its episodes, under a seed."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(purpose, *index)))

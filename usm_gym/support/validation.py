@@ -1,10 +1,11 @@
-"""Types of validated fields, and the one sentence in which the packages refuse bad input."""
+"""Types of validated fields, and the one sentence that refuses bad input."""
 
 from __future__ import annotations
 
 import functools
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import numpy as np
@@ -20,8 +21,8 @@ Number = Annotated[float, Strict()]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Switch = Annotated[bool, Strict()]
 
-# How many characters of an input an error quotes, how many of its own words it has, and how many
-# faults of one input it names.
+# The most characters that an error quotes of an input, the most that it has itself, and the most
+# faults of one input that it names.
 QUOTED, SAID, FAULTS = 80, 1000, 3
 
 _repr = reprlib.Repr()
@@ -29,39 +30,62 @@ _repr.maxlevel = 3
 _repr.maxstring = _repr.maxother = _repr.maxlong = QUOTED
 
 
+class UsageError(ValueError):
+    """What a user can mend: an argument, an option or a file is not as it has to be.
+
+    The `usm` command answers with one line. Other exceptions, `OSError` aside, are bugs of ours.
+    """
+
+
+@contextmanager
+def explaining(what: str) -> Iterator[None]:
+    """Put what an input is taken for before the reason why it is refused.
+
+    Args:
+        what: For instance "mine.json is no file of gains".
+
+    Raises:
+        UsageError: If the input is refused inside.
+    """
+    try:
+        yield
+    except (UsageError, ValidationError) as error:
+        raise UsageError(f"{what}: {in_one_line(error)}") from error
+
+
 def require(condition: object, name: str, value: object, allowed: str) -> None:
-    """Raise a `ValueError` that names the argument, its value and what is allowed.
+    """Raise a `UsageError` that names the argument, its value and what is allowed.
 
     Args:
         condition: Whether the value is acceptable.
         name: Name of the argument or field.
-        value: What was given; `brief` shortens it.
-        allowed: What would have been accepted, in words.
+        value: The value; `brief` shortens it.
+        allowed: The values that are allowed, in words.
 
     Raises:
-        ValueError: If the condition does not hold.
+        UsageError: If the condition does not hold.
     """
     if not condition:
-        raise ValueError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
+        raise UsageError(f"{clipped(name)} is {brief(value)}; allowed: {clipped(allowed, SAID)}")
 
 
 def is_whole(value: object, low: int, high: int | None = None) -> bool:
-    """Whether a value is an integer, and no truth value, from `low` to `high`."""
+    """Whether a value is an integer from `low` to `high`, and not a bool."""
     if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
         return False
     return bool(low <= value and (high is None or value <= high))
 
 
 def real_array(name: str, value: object, allowed: str = "real numbers") -> NDArray[Any]:
-    """Give a value as an array, of the type of numbers that it has.
+    """Convert a value to an array and keep its type of number.
 
     Raises:
         ValueError: If it holds anything but real numbers.
     """
     try:
         array = np.asarray(value)
-    except Exception as error:  # whatever an object does that is to become an array
-        raise ValueError(f"{name} is {brief(value)}; allowed: {allowed}") from error
+    except Exception as error:  # a foreign object may raise anything
+        raise UsageError(f"{name} is {brief(value)}; allowed: {allowed}") from error
     require(array.dtype.kind in "biuf", name, value, allowed)
     return array
 
@@ -70,7 +94,7 @@ def real_array(name: str, value: object, allowed: str = "real numbers") -> NDArr
 def validated(cls: type[T]) -> type[T]:
     """Make a frozen dataclass whose fields are validated.
 
-    What is wrong with them is a `ValueError` of one line, where pydantic's own would have many.
+    A wrong field raises a `UsageError` of one line, where pydantic's own error has many.
     """
     made: Any = dataclass(frozen=True, config=CONFIG)(cls)
     init = made.__init__
@@ -80,7 +104,7 @@ def validated(cls: type[T]) -> type[T]:
         try:
             init(self, *arguments, **fields)
         except ValidationError as error:
-            raise ValueError(in_one_line(error)) from error
+            raise UsageError(in_one_line(error)) from error
 
     made.__init__ = checked
     known: type[T] = made
@@ -93,34 +117,34 @@ def build(adapter: TypeAdapter[T], name: str, fields: Any, allowed: str = "a dic
     Args:
         adapter: The type.
         name: Name of the argument that the dict was given for.
-        fields: Values by name; those left out have their defaults.
-        allowed: What would have been accepted, in words.
+        fields: Values by name; missing ones have their defaults.
+        allowed: The values that are allowed, in words.
 
     Raises:
-        ValueError: If it is no dict, a field is unknown, or a value not allowed.
+        ValueError: If it is not a dict, a field is unknown, or a value is not allowed.
     """
     require(isinstance(fields, Mapping), name, fields, allowed)
     try:
         known = dict(fields)
-    except Exception as error:  # whatever a mapping of somebody's own does
-        raise ValueError(f"{name} is {brief(fields)}; allowed: {allowed}") from error
+    except Exception as error:  # a foreign mapping may raise anything
+        raise UsageError(f"{name} is {brief(fields)}; allowed: {allowed}") from error
     require(all(isinstance(field, str) for field in known), name, fields, allowed)
     try:
         return adapter.validate_python(known)
     except ValidationError as error:
-        raise ValueError(in_one_line(error)) from error
+        raise UsageError(in_one_line(error)) from error
 
 
 def brief(value: object) -> str:
-    """Quote a value in one line of at most `QUOTED` characters, however large or odd it is."""
+    """Quote any value in one line of at most `QUOTED` characters."""
     try:
         return clipped(_repr.repr(value))
-    except ValueError:  # an integer of more digits than Python is willing to print
+    except ValueError:  # Python refuses to print an integer of very many digits
         return f"<{type(value).__name__}>"
 
 
 def clipped(text: str, most: int = QUOTED) -> str:
-    """Put a text on one line of at most so many characters, without its middle if it is longer."""
+    """Put a text on one line of at most `most` characters; a longer one loses its middle."""
     line = " ".join(text[: 10 * most].split())
     if len(line) <= most and len(text) <= 10 * most:
         return line
@@ -129,11 +153,11 @@ def clipped(text: str, most: int = QUOTED) -> str:
 
 
 def in_one_line(error: BaseException) -> str:
-    """Say on one line what an exception says, each wrong field with its value."""
+    """Write an exception in one line, with the value of every wrong field."""
     if isinstance(error, ValidationError):
         return _faults(error)
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
-        # Paths are long, and a path without its middle is of little use.
+        # Paths are long, and useless without their middle.
         return f"{error.strerror}: {clipped(str(error.filename), 3 * QUOTED)}"
     if isinstance(error, KeyError) and error.args:
         return f"{brief(error.args[0])} is missing"

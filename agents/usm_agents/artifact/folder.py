@@ -26,7 +26,7 @@ from usm_baselines.registry import make, register
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
-from usm_gym.support.validation import in_one_line, require, validated
+from usm_gym.support.validation import UsageError, explaining, in_one_line, require, validated
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 
@@ -126,18 +126,16 @@ def read_agent(folder: Path) -> tuple[Agent, Network]:
     try:
         return agent, _network(agent, load(data))
     except KeyError as error:  # a type of numbers, or the name of an array
-        raise ValueError(
+        raise UsageError(
             f"{folder / WEIGHTS} is no network: {error}; allowed: weights and biases, float32"
         ) from error
     except (SafetensorError, TypeError, ValueError) as error:
-        raise ValueError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
+        raise UsageError(f"{folder / WEIGHTS} is no network: {in_one_line(error)}") from error
 
 
 def _description(folder: Path) -> Agent:
-    try:
+    with explaining(f"{folder / DESCRIPTION} is no agent"):
         return _ADAPTER.validate_python(read_json(folder / DESCRIPTION, links=False))
-    except ValueError as error:
-        raise ValueError(f"{folder / DESCRIPTION} is no agent: {in_one_line(error)}") from error
 
 
 def _weights(folder: Path, expected: str) -> bytes | None:

@@ -20,7 +20,7 @@ from usm_agents.learning.learner import Learner
 from usm_agents.learning.plan import PLAN
 from usm_agents.learning.validation import Validation
 from usm_gym.support.files import move_folder, naming, remove_folder, write_json
-from usm_gym.support.validation import in_one_line
+from usm_gym.support.validation import UsageError, in_one_line
 
 CURVE, PROGRESS = "curve.json", "progress.pickle"
 PART = "checkpoint.part"
@@ -83,7 +83,7 @@ def read_checkpoint(checkpoint: Path, learner: Learner) -> Progress:
         assert vars(progress).keys() == {field.name for field in fields(Progress)}
     except Exception as error:  # whatever becomes of the pickles of another version
         reason = f"{type(error).__name__}: {in_one_line(error)}"
-        raise ValueError(f"{checkpoint} is damaged, or of another version ({reason})") from error
+        raise UsageError(f"{checkpoint} is damaged, or of another version ({reason})") from error
     known: Progress = progress
     return known
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_agents.learning.validation import Validation
+from usm_gym.support.validation import UsageError
 from usm_gym.task.metrics import total_error
 
 # So many validations in a row are so many times worse than the best.
@@ -16,7 +17,7 @@ COLLAPSE_COUNT, COLLAPSE_RATIO = 3, 5.0
 LARGEST_WEIGHT = 1e6
 
 
-class DivergedError(ValueError):
+class DivergedError(UsageError):
     """A training that has diverged."""
 
 

@@ -44,9 +44,9 @@ class TrainingSetup:
         episode_seed: Seed of the scenarios that follow the first ones.
         first_episodes: One for each robot, of all lengths, so that the robots are at different
             times of their episodes from then on.
-        truth: Gives what no policy can observe, for the robots as `envs` last returned them, in SI
-            units, the robots along the first axis: hydrodynamic "coefficients" (robots, 6),
-            "water_velocity", "velocity" and "disturbance" (robots, 2).
+        truth: Gives what no policy can observe, by name, for the robots as `envs` last returned
+            them, in SI units, (robots, numbers). On the tasks of this package: "coefficients",
+            "water_velocity", "velocity" and "disturbance", see `PlanarWorld.truth`.
         folder: The folder of the training, for logs that TensorBoard reads.
     """
 

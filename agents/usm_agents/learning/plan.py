@@ -15,7 +15,7 @@ from pydantic import Field, Strict, TypeAdapter
 from usm_agents.learning.learner import algorithms
 from usm_agents.residual.task import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.support.files import read_bytes, write_json
-from usm_gym.support.validation import Count, in_one_line, require, validated
+from usm_gym.support.validation import Count, UsageError, in_one_line, require, validated
 from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
@@ -133,7 +133,7 @@ def read_plan(folder: Path) -> Plan:
     try:
         return _PLAN.validate_json(read_bytes(folder / PLAN))
     except (OSError, ValueError) as error:
-        raise ValueError(f"{folder} holds no training: {in_one_line(error)}") from error
+        raise UsageError(f"{folder} holds no training: {in_one_line(error)}") from error
 
 
 def _listed(value: Any) -> Any:

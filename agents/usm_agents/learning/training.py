@@ -38,6 +38,7 @@ from usm_agents.learning.validation import (
     validate,
 )
 from usm_agents.residual.env import ResidualVectorEnv
+from usm_gym.envs.vector_env import TrackingVectorEnv
 from usm_gym.support.files import holding
 from usm_gym.support.seeding import TRAINING, stream
 from usm_gym.support.validation import require
@@ -98,7 +99,7 @@ def prepare(plan: Plan, folder: Path) -> TrainingSetup:
         **plan.task,
     )
     assert isinstance(envs, ResidualVectorEnv)
-    plain: Any = envs.unwrapped
+    assert isinstance(envs.unwrapped, TrackingVectorEnv)
     random = stream(plan.seed, TRAINING)
     episode_seed = int(random.integers(2**31))
     # First episodes of all lengths, so that afterwards the robots are at all times of an episode.
@@ -115,7 +116,7 @@ def prepare(plan: Plan, folder: Path) -> TrainingSetup:
         envs=envs,
         episode_seed=episode_seed,
         first_episodes=first_episodes,
-        truth=lambda: plain.truth(),
+        truth=envs.unwrapped.truth,
         folder=folder,
     )
 

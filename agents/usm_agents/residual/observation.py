@@ -1,4 +1,4 @@
-"""What the agent of the residual task sees: the table, which `residual_observer` fills."""
+"""What the agent of the residual task sees: the table, which `observer` fills."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cached_property
 from usm_gym.sensors import Entry, Layout
 from usm_gym.support.validation import require
 
-# How the agent sees the numbers that laws declare as `shown`.
+# How the agent sees the numbers of the base's state that its law declares as `shown`.
 BASE_ENTRIES = {
     "rate": Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer"),
     "disturbance": Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same"),

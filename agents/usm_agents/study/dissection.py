@@ -20,6 +20,7 @@ from usm_agents.artifact.folder import make_agent
 from usm_agents.learning.plan import TEST_SEED
 from usm_agents.residual.task import Memory, ResidualPolicy
 from usm_agents.study.plans import AGENTS
+from usm_agents.study.results import Dissection, ForceShares
 from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy
@@ -28,6 +29,7 @@ from usm_gym.suites import unseen
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Scenario
+from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
 
@@ -39,12 +41,12 @@ EPISODES = 16
 SEGMENT = 500
 
 
-class Recorder:
-    """A policy that keeps the forces it commands, in x and y in the global frame, N.
+class ForceLog:
+    """A policy that keeps the forces it commands, in each axis of the task, N.
 
     Attributes:
-        total: Commanded force of each step, before saturation, each (batch, 2).
-        base: Of which the base's, where the policy is a base with an agent.
+        total: Commanded force of each step, before saturation, (batch, axes).
+        base: The base's part of it, where the policy is a base with an agent.
     """
 
     def __init__(self, nominal: Nominal, policy: Policy, limit: float) -> None:
@@ -64,16 +66,14 @@ class Recorder:
         action, state = self._policy.predict(observation, state, start, deterministic, **truth)
         signals, _, _, self._estimates = self._estimator.update(observation, self._estimates, start)
         memory = state[0] if isinstance(state, tuple) else None
-        forces = signals.allocation[:, :2]
+        forces = signals.allocation[:, : signals.y.shape[1]]
         self.total.append(np.einsum("bwt,bt->bw", forces, action * self._limit))
         if isinstance(memory, Memory):
             self.base.append(np.einsum("bwt,bt->bw", forces, memory.base_action * self._limit))
         return action, state
 
 
-def dissect(
-    policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenario]
-) -> dict[str, Any]:
+def dissect(policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenario]) -> Dissection:
     """Forces of base, residual and both, beside the needed one.
 
     Args:
@@ -82,20 +82,17 @@ def dissect(
         scenarios: Episodes of one length and one thruster limit.
 
     Returns:
-        Of each axis: standard deviation of each force, N, also of the base's when it acts alone;
-        the share of base - needed that the residual takes back, and the share of needed that it
-        adds, by least squares, with the share of the residual's variance which the two explain; by
-        how many seconds the whole force is late behind the needed one, by the largest correlation;
-        and power spectral densities, N^2/Hz, over the frequencies, Hz.
+        Standard deviations and spectra of the forces, and how the residual is made up of what the
+        base commands in excess and of the needed force, by least squares.
     """
     limit = scenarios[0].conditions.thruster_limit
     settled = round(scenarios[0].settle_time / nominal.control_period)
     watched = []
     for each in (policy, policy.base, Oracle(nominal)):
-        recorder = Recorder(nominal, each, limit)
-        rollout(recorder, scenarios)
-        watched.append(recorder)
-    total, alone, needed = (np.stack(recorder.total)[settled:] for recorder in watched)
+        log = ForceLog(nominal, each, limit)
+        rollout(log, scenarios)
+        watched.append(log)
+    total, alone, needed = (np.stack(log.total)[settled:] for log in watched)
     base = np.stack(watched[0].base)[settled:]
     forces = {
         "needed": needed,
@@ -105,33 +102,31 @@ def dissect(
         "both": total,
     }
     frequency = welch(needed, nominal.control_period)[0]
-    return {
-        "frequency": frequency.tolist(),
-        **{
-            axis: axis_of({name: force[..., k] for name, force in forces.items()}, nominal)
-            for k, axis in enumerate("xy")
+    return Dissection(
+        frequency=tuple(frequency.tolist()),
+        axes={
+            axis: shares_of({name: force[..., k] for name, force in forces.items()}, nominal)
+            for k, axis in enumerate(world_of(scenarios[0].body).axes)
         },
-    }
+    )
 
 
-def axis_of(forces: dict[str, Array], nominal: Nominal) -> dict[str, Any]:
-    """What `dissect` finds in one axis; forces as (steps, episodes)."""
+def shares_of(forces: dict[str, Array], nominal: Nominal) -> ForceShares:
+    """What an agent does to its base in one axis; forces as (steps, episodes)."""
     needed, residual = forces["needed"], forces["residual"]
     excess = forces["base"] - needed
     parts = np.stack([-excess.ravel(), needed.ravel()], axis=1)
     shares, *_ = np.linalg.lstsq(parts, residual.ravel(), rcond=None)
     left = residual.ravel() - parts @ shares
-    return {
-        "deviation": {name: float(force.std()) for name, force in forces.items()},
-        "excess_taken_back": float(shares[0]),
-        "needed_added": float(shares[1]),
-        "explained": 1.0 - float(left.var() / residual.var()),
-        "lateness": lateness(forces["both"], needed) * nominal.control_period,
-        "spectrum": {
-            name: welch(force, nominal.control_period)[1].mean(axis=1).tolist()
-            for name, force in forces.items()
-        },
-    }
+    spectra = {name: welch(force, nominal.control_period)[1] for name, force in forces.items()}
+    return ForceShares(
+        deviation={name: float(force.std()) for name, force in forces.items()},
+        excess_taken_back=float(shares[0]),
+        needed_added=float(shares[1]),
+        explained=1.0 - float(left.var() / residual.var()),
+        lateness=lateness(forces["both"], needed) * nominal.control_period,
+        spectrum={name: tuple(each.mean(axis=1).tolist()) for name, each in spectra.items()},
+    )
 
 
 def lateness(force: Array, needed: Array) -> int:
@@ -155,13 +150,13 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
     return frequency, density
 
 
-def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Any]:
+def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
     """What each agent, as its seed 0, does to its base; see `dissect`."""
-    found = {}
-    for run in chosen:
-        if run.name in AGENTS and run.plan.seed == 0:
-            episodes = unseen(run.plan.mode, FIELD, TEST_SEED, EPISODES)
+    made = {}
+    for training in chosen:
+        if training.name in AGENTS and training.plan.seed == 0:
+            episodes = unseen(training.plan.mode, FIELD, TEST_SEED, EPISODES)
             nominal = shared_nominal(Robot(), episodes)
-            policy = make_agent(nominal, str(run.folder))
-            found[run.name] = dissect(policy, nominal, episodes)
-    return found
+            policy = make_agent(nominal, str(training.folder))
+            made[training.name] = dissect(policy, nominal, episodes)
+    return made

@@ -8,71 +8,78 @@ from typing import Any
 
 import numpy as np
 
-from usm_agents.study.plans import HOME
-from usm_agents.study.scores import Document
+from usm_agents.study.results import MAIN_MODE, Rival, StudyResult, Trained
 
 SHADE = 0.2
 
 
-def draw_all(found: Document, folder: Path) -> None:
+def draw_all(study: StudyResult, folder: Path) -> None:
     """Draw learning curves, error against thrust variation, and spectra into a folder; PNG."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    drawn = {"curves": _curves(found), "front": _front(found)}
-    if found["dissected"]:
-        drawn["spectra"] = _spectra(found["dissected"])
+    drawn = {"curves": _curves(study), "front": _front(study)}
+    if study.dissected:
+        drawn["spectra"] = _spectra(study)
     for name, figure in drawn.items():
         figure.savefig(folder / f"{name}.png", dpi=120, metadata={"Software": None})
         plt.close(figure)
 
 
-def _curves(found: Document) -> Any:
+def _curves(study: StudyResult) -> Any:
     from matplotlib import pyplot as plt
 
-    kinds = [
-        (title, [name for name, each in found["rows"].items() if each["agent"] is agent])
-        for title, agent in (("agents", True), ("ablations", False))
-    ]
-    kinds = [(title, names) for title, names in kinds if names]
+    kinds = {"agents": study.agents, "ablations": study.ablations}
+    kinds = {title: rows for title, rows in kinds.items() if rows}
     figure, grid = plt.subplots(
-        len(kinds), 2, figsize=(11.5, 4.2 * len(kinds)), squeeze=False, layout="constrained"
+        *(len(kinds), len(study.axes)),
+        figsize=(5.75 * len(study.axes), 4.2 * len(kinds)),
+        squeeze=False,
+        layout="constrained",
     )
-    for panels, (title, names) in zip(grid, kinds, strict=True):
-        for panel, axis in zip(panels, "xy", strict=True):
-            for number, name in enumerate(names):
-                curves = list(found["rows"][name]["curves"].values())
-                length = min(map(len, curves))
-                steps = [point["steps"] / 1e6 for point in curves[0][:length]]
-                errors = 1e3 * np.array(
-                    [[point[f"max_error_{axis}"] for point in curve[:length]] for curve in curves]
-                )
+    for panels, (title, rows) in zip(grid, kinds.items(), strict=True):
+        for panel, axis in zip(panels, study.axes, strict=True):
+            for number, (name, row) in enumerate(rows.items()):
                 colour, style = f"C{number % 10}", "-" if number < 10 else "--"
+                steps, errors = _learned(row, axis)
                 panel.plot(steps, errors.mean(axis=0), style, color=colour, label=name)
                 low, high = errors.min(axis=0), errors.max(axis=0)
                 panel.fill_between(steps, low, high, color=colour, alpha=SHADE, linewidth=0)
             panel.set(yscale="log", xlabel="million steps", ylabel=f"error in {axis} [mm]")
             panel.grid(alpha=0.3)
         panels[0].set_title(f"{title}: mean over seeds, and from the best seed to the worst")
-        panels[1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0))
+        panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0))
     return figure
 
 
-def _front(found: Document) -> Any:
+def _learned(row: Trained, axis: str) -> tuple[list[float], Any]:
+    """Millions of steps, and the errors of all seeds after them, mm, (seeds, points)."""
+    curves = list(row.curves.values())
+    length = min(map(len, curves))
+    steps = [point.steps / 1e6 for point in curves[0][:length]]
+    return steps, 1e3 * np.array([[each.errors[axis] for each in c[:length]] for c in curves])
+
+
+def _front(study: StudyResult) -> Any:
     from matplotlib import pyplot as plt
 
-    figure, panels = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
-    rows = [(name, each, "o") for name, each in found["rows"].items() if each["agent"]]
-    rows += [(name, each, "s") for name, each in found["rivals"].items()]
-    rows = [each for each in rows if each[1]["mode"] == "operation"]
-    for panel, axis in zip(panels, "xy", strict=True):
-        for number, (name, each, marker) in enumerate(rows):
-            scores = each["scores"][HOME]
-            place = scores["thrust_variation"]["mean"], 1e3 * scores[f"max_error_{axis}"]["mean"]
-            fill = f"C{number % 10}" if marker == "o" else "none"
-            panel.plot(*place, marker, color=f"C{number % 10}", markerfacecolor=fill, label=name)
+    figure, (panels,) = plt.subplots(
+        *(1, len(study.axes)),
+        figsize=(5 * len(study.axes), 4.8),
+        squeeze=False,
+        layout="constrained",
+    )
+    rows: Mapping[str, Trained | Rival] = {**study.agents, **study.rivals}
+    rows = {name: each for name, each in rows.items() if each.mode == MAIN_MODE}
+    for panel, axis in zip(panels, study.axes, strict=True):
+        for number, (name, row) in enumerate(rows.items()):
+            scores = row.scores[study.home]
+            place = scores.metrics["thrust_variation"].mean, 1e3 * scores.errors[axis].mean
+            colour = f"C{number % 10}"
+            marker, fill = ("o", colour) if name in study.agents else ("s", "none")
+            panel.plot(*place, marker, color=colour, markerfacecolor=fill, label=name)
         panel.set(
             xscale="log",
             yscale="log",
@@ -85,22 +92,21 @@ def _front(found: Document) -> Any:
     return figure
 
 
-def _spectra(found: Mapping[str, Any]) -> Any:
+def _spectra(study: StudyResult) -> Any:
     from matplotlib import pyplot as plt
 
+    count = len(study.dissected)
     figure, grid = plt.subplots(
-        len(found),
-        2,
-        figsize=(10, 2.8 * len(found)),
+        *(count, len(study.axes)),
+        figsize=(5 * len(study.axes), 2.8 * count),
         squeeze=False,
         sharex=True,
         layout="constrained",
     )
-    for panels, (name, each) in zip(grid, found.items(), strict=True):
-        frequency = each["frequency"][1:]
-        for panel, axis in zip(panels, "xy", strict=True):
-            for force, density in each[axis]["spectrum"].items():
-                panel.plot(frequency, density[1:], label=force)
+    for panels, (name, each) in zip(grid, study.dissected.items(), strict=True):
+        for panel, (axis, shares) in zip(panels, each.axes.items(), strict=True):
+            for force, density in shares.spectrum.items():
+                panel.plot(each.frequency[1:], density[1:], label=force)
             panel.set(xscale="log", yscale="log", ylabel=f"{name}, {axis} [N²/Hz]")
             panel.grid(alpha=0.3)
     for panel in grid[-1]:

@@ -4,42 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from usm_baselines.benchmark.scoring import Refusal, Task, score_all, shared_nominal
+from usm_baselines.benchmark.scoring import Job, Refusal, score_all, shared_nominal
 from usm_baselines.contender import Contender, contender
 
 from usm_agents.artifact.folder import agent_contender
 from usm_agents.learning.plan import TEST_EPISODES, TEST_SEED
+from usm_agents.study.dissection import dissected
 from usm_agents.study.plans import AGENTS, HOME, TRANSFER
+from usm_agents.study.results import (
+    MAIN_MODE,
+    Claim,
+    CurvePoint,
+    Rival,
+    SeedScores,
+    SeedSummary,
+    StudyResult,
+    Trained,
+)
 from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import Evaluation, joined
 from usm_gym.robot import Robot
 from usm_gym.statistics import interquartile_mean, interval, ratio_interval
 from usm_gym.suites import unseen
+from usm_gym.support.results import Provenance
+from usm_gym.support.validation import UsageError
 from usm_gym.task.conditions import FIELD
+from usm_gym.task.metrics import MAX_ERROR, axes_of
 from usm_gym.task.scenario import Mode
 
-# Kept of each episode.
-KEPT = (
-    "max_error_x",
-    "max_error_y",
-    "settled_error_x",
-    "settled_error_y",
-    "thrust_variation",
-    "thrust_effort",
-)
-
-Document = dict[str, Any]
+# Kept of each episode in each axis, and besides.
+ERRORS, OTHERS = ("max_error", "settled_error"), ("thrust_variation", "thrust_effort")
 
 
-def tasks(
+def jobs(
     chosen: Sequence[StudyTraining], rivals: Sequence[str], episodes: int = TEST_EPISODES
-) -> dict[tuple[str, str], Task]:
+) -> dict[tuple[str, str], Job]:
     """What is scored, by policy and set: all at home, agents and rivals also elsewhere."""
     robot = Robot()
-    modes = {run.plan.mode for run in chosen}
+    modes = {training.plan.mode for training in chosen}
     sets = {
         (mode, name): unseen(
             mode, conditions, TEST_SEED, episodes if name == HOME else episodes // 2
@@ -47,166 +51,160 @@ def tasks(
         for mode in sorted(modes)
         for name, conditions in {HOME: FIELD, **TRANSFER}.items()
     }
-    found = {}
+    planned = {}
 
     def add(name: str, policy: Contender, mode: Mode, everywhere: bool) -> None:
         for (its, kind), chosen in sets.items():
             if its == mode and (everywhere or kind == HOME):
                 nominal = shared_nominal(robot, chosen)
-                found[name, kind] = Task(policy, tuple(chosen), nominal, robot)
+                planned[name, kind] = Job(policy, tuple(chosen), nominal, robot)
 
-    for run in chosen:
-        agent = agent_contender(str(run.folder))
-        add(run.folder.name, agent, run.plan.mode, run.name in AGENTS)
+    for training in chosen:
+        agent = agent_contender(str(training.folder))
+        add(training.folder.name, agent, training.plan.mode, training.name in AGENTS)
     for mode in sorted(modes):
         for id in rivals:
             add(rival_name(id, mode), contender(id), mode, everywhere=True)
-    return found
+    return planned
 
 
 def rival_name(id: str, mode: Mode) -> str:
     """The name of a classical policy's scores."""
-    return id if mode == "operation" else f"{id} ({mode})"
+    return id if mode == MAIN_MODE else f"{id} ({mode})"
 
 
 def score(
-    chosen: Mapping[tuple[str, str], Task],
+    chosen: Mapping[tuple[str, str], Job],
     workers: int,
     cache: Path,
     progress: Callable[[int], object],
 ) -> dict[tuple[str, str], Evaluation]:
-    """Score the tasks.
+    """Score policies.
 
     Raises:
-        ValueError: If a policy is refused.
+        UsageError: If a policy is refused.
     """
     outcomes = score_all(list(chosen.values()), workers, cache, progress)
-    found = {}
+    scores = {}
     for key, outcome in zip(chosen, outcomes, strict=True):
         if isinstance(outcome, Refusal):
-            raise ValueError(f"{key[0]} on {key[1]} is refused: {outcome.reason}")
-        found[key] = outcome
-    return found
+            raise UsageError(f"{key[0]} on {key[1]} is refused: {outcome.reason}")
+        scores[key] = outcome
+    return scores
 
 
-def document(
+def study(
     chosen: Sequence[StudyTraining],
     scores: Mapping[tuple[str, str], Evaluation],
     rivals: Sequence[str],
-) -> Document:
+    episodes: int,
+    provenance: Provenance,
+) -> StudyResult:
     """A row for each agent and ablation over its seeds, and one for each rival."""
-    rows: dict[str, Any] = {}
+    rows: dict[str, Trained] = {}
     sets = [HOME, *TRANSFER]
-    for name in dict.fromkeys(run.name for run in chosen):
-        its = [run for run in chosen if run.name == name]
+    for name in dict.fromkeys(training.name for training in chosen):
+        its = [training for training in chosen if training.name == name]
         parts = {
-            kind: [scores[run.folder.name, kind] for run in its]
+            kind: [scores[training.folder.name, kind] for training in its]
             for kind in sets
             if (its[0].folder.name, kind) in scores
         }
-        rows[name] = {
-            "agent": name in AGENTS,
-            "mode": its[0].plan.mode,
-            "base": its[0].plan.base,
-            "command": its[0].plan.command(name),
-            "curves": {str(run.plan.seed): run.curve for run in its},
-            "scores": {kind: row(each) for kind, each in parts.items()},
-        }
-    modes: dict[Mode, None] = dict.fromkeys(run.plan.mode for run in chosen)
+        plan = its[0].plan
+        rows[name] = Trained(
+            agent=name in AGENTS,
+            mode=plan.mode,
+            base=plan.base,
+            command=plan.command(name),
+            curves={str(each.plan.seed): each.curve for each in its},
+            scores={kind: over_seeds(each) for kind, each in parts.items()},
+        )
+    modes: dict[Mode, None] = dict.fromkeys(training.plan.mode for training in chosen)
     others = {
-        name: {
-            "mode": mode,
-            "scores": {kind: row([scores[name, kind]]) for kind in sets},
-        }
+        name: Rival(mode=mode, scores={kind: over_seeds([scores[name, kind]]) for kind in sets})
         for mode in modes
         for name in (rival_name(id, mode) for id in rivals)
     }
-    return {
-        "kind": "study",
-        "study": "residual",
-        "home": HOME,
-        "seed": TEST_SEED,
-        "rows": rows,
-        "rivals": others,
-        "against": claims(rows, others),
-    }
+    return StudyResult(
+        study="residual",
+        home=HOME,
+        seed=TEST_SEED,
+        rows=rows,
+        rivals=others,
+        against=claims(rows, others),
+        episodes=episodes,
+        dissected=dissected(chosen),
+        provenance=provenance,
+    )
 
 
-def row(parts: Sequence[Evaluation]) -> dict[str, Any]:
-    """Scores over seeds, as `Evaluation.summary` has them, with middle half and the seeds' means.
+def over_seeds(parts: Sequence[Evaluation]) -> SeedScores:
+    """Scores over seeds, with middle half and the seeds' means.
 
     Seeds are strata of the bootstrap, whose episodes are resampled; episodes are in the order of
     the seeds.
     """
     scores = joined(parts)
     labels = [str(seed) for seed, part in enumerate(parts) for _ in part.failed]
-    found: dict[str, Any] = {"failures": int(scores.failed.sum()), "per_episode": {}}
-    for name in KEPT:
+    axes = axes_of(scores.per_episode)
+    kept = (*(f"{name}_{axis}" for name in ERRORS for axis in axes), *OTHERS)
+    metrics = {}
+    for name in kept:
         values = scores.per_episode[name]
-        found["per_episode"][name] = values.tolist()
-        found[name] = {
-            "mean": float(values.mean()),
-            "ci95": list(interval(np.mean, values, labels)),
-            "iqm": float(interquartile_mean(values)),
-            "iqm_ci95": list(interval(interquartile_mean, values, labels)),
-            "worst": float(values.max()),
-            "seeds": [float(part.per_episode[name].mean()) for part in parts],
-        }
-    return found
+        metrics[name] = SeedSummary(
+            mean=float(values.mean()),
+            ci95=interval(np.mean, values, labels),
+            iqm=float(interquartile_mean(values)),
+            iqm_ci95=interval(interquartile_mean, values, labels),
+            worst=float(values.max()),
+            seeds=tuple(float(part.per_episode[name].mean()) for part in parts),
+        )
+    return SeedScores(
+        failures=int(scores.failed.sum()),
+        per_episode={name: tuple(scores.per_episode[name].tolist()) for name in kept},
+        metrics=metrics,
+    )
 
 
-def claims(rows: Mapping[str, Any], rivals: Mapping[str, Any]) -> dict[str, Any]:
-    """What agents are to the classical policies of their mode at home, scenario by scenario.
-
-    Args:
-        rows: Agents and ablations, as in `document`.
-        rivals: Classical policies, the same.
-
-    Returns:
-        For each agent and rival: the ratio of their means in x and y over all seeds, with its
-        intervals; in what share of scenarios the agent, as its seed 0, is better in both axes; and
-        how many of its seeds are better in the mean of both.
-    """
+def claims(rows: Mapping[str, Trained], rivals: Mapping[str, Rival]) -> dict[str, dict[str, Claim]]:
+    """What agents are to the classical policies of their mode at home, scenario by scenario."""
     return {
         name: {
-            rival: against(each["scores"][HOME], other["scores"][HOME])
+            rival: against(each.scores[HOME], other.scores[HOME])
             for rival, other in rivals.items()
-            if other["mode"] == each["mode"]
+            if other.mode == each.mode
         }
         for name, each in rows.items()
-        if each["agent"]
+        if each.agent
     }
 
 
-def against(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> dict[str, Any]:
-    """What the row of an agent is to the row of a policy without seeds; see `claims`."""
+def against(ours: SeedScores, theirs: SeedScores) -> Claim:
+    """What an agent is to a policy without seeds."""
     ratios, intervals, better, seeds = [], [], [], []
-    for axis in ("max_error_x", "max_error_y"):
-        their = np.array(theirs["per_episode"][axis])
-        our = np.array(ours["per_episode"][axis]).reshape(-1, len(their))
+    for axis in ours.axes:
+        their = np.array(theirs.per_episode[MAX_ERROR + axis])
+        our = np.array(ours.per_episode[MAX_ERROR + axis]).reshape(-1, len(their))
         labels = [str(seed) for seed, part in enumerate(our) for _ in part]
         ratios.append(float(our.mean() / their.mean()))
         intervals.append(ratio_interval(our.ravel(), np.tile(their, len(our)), labels))
         better.append(our[0] < their)
         seeds.append(our.mean(axis=1) < their.mean())
-    return {
-        "ratio": ratios,
-        "ratio_ci95": intervals,
-        "better_in_both": float(np.mean(np.all(better, axis=0))),
-        "better_seeds": int(np.sum(np.all(seeds, axis=0))),
-    }
+    return Claim(
+        ratio=tuple(ratios),
+        ratio_ci95=tuple(intervals),
+        better_in_both=float(np.mean(np.all(better, axis=0))),
+        better_seeds=int(np.sum(np.all(seeds, axis=0))),
+    )
 
 
-def best_so_far(curves: Mapping[str, Any]) -> dict[int, float]:
-    """By steps: validated error x + y of the best agent so far, the median over the seeds, m."""
-    errors = [
-        np.minimum.accumulate([point["max_error_x"] + point["max_error_y"] for point in curve])
-        for curve in curves.values()
-    ]
+def best_so_far(curves: Mapping[str, Sequence[CurvePoint]]) -> dict[int, float]:
+    """By steps: validated error of the best agent so far, the median over the seeds, m."""
+    errors = [np.minimum.accumulate([point.total for point in curve]) for curve in curves.values()]
     points = zip(next(iter(curves.values())), zip(*errors, strict=False), strict=False)
-    return {point["steps"]: float(np.median(each)) for point, each in points}
+    return {point.steps: float(np.median(each)) for point, each in points}
 
 
-def steps_to(curves: Mapping[str, Any], error: float) -> int | None:
+def steps_to(curves: Mapping[str, Sequence[CurvePoint]], error: float) -> int | None:
     """After how many steps the best agents so far are as good as that; see `best_so_far`."""
     return next((steps for steps, each in best_so_far(curves).items() if each <= error), None)

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from pydantic import Field, TypeAdapter
 
 from usm_agents.artifact.folder import read_agent, write_agent
 from usm_agents.learning.checkpoint import CURVE, traces
 from usm_agents.learning.plan import Plan, read_plan
 from usm_agents.learning.training import train
-from usm_agents.learning.validation import Validation, is_validation
 from usm_agents.study.plans import AGENTS, PLANS, SEEDS
+from usm_agents.study.results import CurvePoint
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json
-from usm_gym.support.validation import require
+from usm_gym.support.validation import explaining, require
 
 
 @dataclasses.dataclass(frozen=True)
 class StudyTraining:
-    """One training of the study.
+    """A training of the study.
 
     Attributes:
         name: Name of the agent or ablation.
@@ -55,23 +57,24 @@ class StudyTraining:
         """
         if not (self.begun and (self.folder / CURVE).exists()):
             return False
-        return bool(self.curve[-1]["steps"] >= self.plan.steps)
+        return self.curve[-1].steps >= self.plan.steps
 
     @property
-    def curve(self) -> list[Validation]:
+    def curve(self) -> tuple[CurvePoint, ...]:
         """The learning curve, as far as it goes.
 
         Raises:
             ValueError: If the file holds none.
         """
-        curve = read_json(self.folder / CURVE)
-        valid = isinstance(curve, list) and curve and all(map(is_validation, curve))
-        require(valid, f"file {self.folder / CURVE}", curve, "a learning curve")
-        known: list[Validation] = curve
-        return known
+        path = self.folder / CURVE
+        with explaining(f"{path} is not a learning curve"):
+            return _CURVE.validate_python(read_json(path))
 
 
-def runs(
+_CURVE = TypeAdapter(Annotated[tuple[CurvePoint, ...], Field(min_length=1)])
+
+
+def planned(
     names: Sequence[str], seeds: int, folder: Path, steps: int | None = None
 ) -> list[StudyTraining]:
     """The trainings of the study, seed by seed, so that an early stop leaves some of each.
@@ -85,15 +88,15 @@ def runs(
     Raises:
         ValueError: If a name is unknown.
     """
-    found = []
+    listed = []
     for seed in range(seeds):
         for name in names:
             require(name in PLANS, "--only", name, ", ".join(PLANS))
             if seed >= SEEDS[name]:
                 continue
             plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
-            found.append(StudyTraining(name, plan, folder / "runs" / f"{name}-{seed}"))
-    return found
+            listed.append(StudyTraining(name, plan, folder / "runs" / f"{name}-{seed}"))
+    return listed
 
 
 def train_all(
@@ -107,32 +110,32 @@ def train_all(
         ValueError: If a folder holds another training; then none has begun.
     """
     waiting = []
-    for run in chosen:
-        if run.done:
-            report(run)
+    for training in chosen:
+        if training.done:
+            report(training)
         else:
-            waiting.append(run)
-    for index, _ in parallel.results(train_one, [(run,) for run in waiting], workers):
+            waiting.append(training)
+    for index, _ in parallel.results(train_one, [(training,) for training in waiting], workers):
         report(waiting[index])
 
 
-def train_one(run: StudyTraining) -> None:
+def train_one(training: StudyTraining) -> None:
     """Carry out one training."""
-    train(run.plan, run.folder, lambda steps, line: None, resume=run.begun)
+    train(training.plan, training.folder, lambda steps, line: None, resume=training.begun)
 
 
-def ship(chosen: Sequence[StudyTraining], folder: Path, provenance: Mapping[str, Any]) -> None:
+def ship(chosen: Sequence[StudyTraining], folder: Path, command: str) -> None:
     """Put each agent, as its seed 0, under its own name into a folder.
 
     Args:
         chosen: The trainings.
         folder: Where; each agent has a folder of its own there.
-        provenance: Of the study.
+        command: The command of the study.
     """
-    for run in chosen:
-        if run.name not in AGENTS or run.plan.seed != 0:
+    for training in chosen:
+        if training.name not in AGENTS or training.plan.seed != 0:
             continue
-        agent, network = read_agent(run.folder)
+        agent, network = read_agent(training.folder)
         given = ("activation", "output", "weights")
         description = {
             field.name: getattr(agent, field.name)
@@ -142,9 +145,9 @@ def ship(chosen: Sequence[StudyTraining], folder: Path, provenance: Mapping[str,
         trained = agent.training["provenance"]
         description["training"] = {
             **agent.training,
-            "command": run.plan.command(run.name),
-            "provenance": {**trained, "command": provenance["command"]},
+            "command": training.plan.command(training.name),
+            "provenance": {**trained, "command": command},
         }
-        tested = {**agent.scores["sampled"], "command": run.plan.test_command(run.name)}
+        tested = {**agent.scores["sampled"], "command": training.plan.test_command(training.name)}
         description["scores"] = {**agent.scores, "sampled": tested}
-        write_agent(folder / run.name, description, network)
+        write_agent(folder / training.name, description, network)

@@ -1,1 +1,1 @@
-"""Scores of many policies: leaderboard, robustness, tuning."""
+"""Scores of many policies: results, leaderboard, robustness, tuning."""

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import ClassVar, Self
 
-import numpy as np
-
-from usm_baselines.benchmark.scoring import TIME_LIMIT, Refusal, Task, shared_nominal
+from usm_baselines.benchmark.results import (
+    CompetitorScores,
+    MiddleSummary,
+    Summary,
+    require_alike,
+)
+from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal, shared_nominal
 from usm_baselines.contender import Contender, contender
 from usm_baselines.gains import FRONT, read_gains
 from usm_baselines.registry import ids
@@ -17,36 +21,154 @@ from usm_gym.evaluation import Evaluation
 from usm_gym.robot import Robot
 from usm_gym.statistics import compare, interquartile_mean, interval
 from usm_gym.suites import NAMES, suite
+from usm_gym.support.results import Interval, Part, Provenance, Result
+from usm_gym.support.validation import Count, Number, Switch, require, validated
+from usm_gym.task.metrics import MAX_ERROR, axes_of
 from usm_gym.task.scenario import Scenario
 
 MAIN = "operation"
 STILL = "operation, joints still"
-# Kept episode by episode, in the order of the suite's scenarios.
-KEPT = ("max_error_x", "max_error_y", "thrust_variation")
 
-Document = dict[str, Any]
+
+@validated
+class Lead:
+    """Whether a row is better than the next.
+
+    Attributes:
+        episodes: From how many episodes.
+        probability: That an episode goes better.
+        ci95: Its 95 % interval.
+        decided: Whether the data decide.
+    """
+
+    episodes: Count
+    probability: Number
+    ci95: Interval
+    decided: Switch
+
+    @classmethod
+    def over(cls, worse: Evaluation, better: Evaluation) -> Self:
+        """The lead of the better scores over the worse."""
+        compared = compare(worse.total_error, better.total_error)
+        return cls(
+            episodes=compared.episodes,
+            probability=compared.improvement,
+            ci95=compared.improvement_ci95,
+            decided=compared.decided,
+        )
+
+
+@validated
+class Standing(CompetitorScores):
+    """A row of the leaderboard.
+
+    Attributes:
+        metrics: Summary of each metric, for the largest errors with the middle half.
+        beats_next: Its lead over the next row; None before a row that is no competitor, and last.
+    """
+
+    metrics: Mapping[str, MiddleSummary | Summary]
+    beats_next: Lead | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse errors without their middle half."""
+        super().__post_init__()
+        require(len(self.middle) == len(self.axes), "metrics", list(self.errors), "with iqm")
+
+    @property
+    def middle(self) -> list[MiddleSummary]:
+        """The largest error in each axis, m."""
+        return [each for each in self.errors.values() if isinstance(each, MiddleSummary)]
+
+
+@validated
+class FrontPoint(Part):
+    """A point of error against thrust variation.
+
+    Attributes:
+        means: Means of the largest error in each axis, m, and of the thrust variation, N/s.
+    """
+
+    beside: ClassVar[str] = "means"
+    means: Mapping[str, Number]
+
+    def __post_init__(self) -> None:
+        """Refuse a point without coordinates."""
+        names = list(self.means)
+        valid = axes_of(names) and "thrust_variation" in names
+        require(valid, "point of the front", names, f"{MAX_ERROR}AXIS and thrust_variation")
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Mean of the largest error, m, by axis."""
+        return {axis: self.means[MAX_ERROR + axis] for axis in axes_of(self.means)}
+
+    @property
+    def thrust_variation(self) -> float:
+        """Mean thrust variation, N/s."""
+        return self.means["thrust_variation"]
+
+
+@validated
+class LeaderboardResult(Result):
+    """The leaderboard, as `usm leaderboard` writes it.
+
+    Attributes:
+        version: Version of usm-gym.
+        suites: Rows by suite and policy, best first.
+        front: Points of the policies that are tuned with other weights, by the policy's id.
+        refused: Why a policy has no row, by suite and policy.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "leaderboard"
+    version: str
+    suites: Mapping[str, Mapping[str, Standing]]
+    front: Mapping[str, tuple[FrontPoint, ...]]
+    refused: Mapping[str, Mapping[str, str]]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        """Refuse a leaderboard without its main suite, and rows that cannot be compared."""
+        require(MAIN in self.suites, "suites", list(self.suites), f"{MAIN} among them")
+        for name, rows in self.suites.items():
+            require(rows, f"rows of {name}", 0, "one policy or more")
+            require_alike(rows.values())
+        axes = {row.axes for rows in self.suites.values() for row in rows.values()}
+        axes |= {tuple(point.errors) for points in self.front.values() for point in points}
+        require(len(axes) == 1, "axes", sorted(axes), "the same in all suites")
+
+    @property
+    def main(self) -> Mapping[str, Standing]:
+        """The rows of the main suite."""
+        return self.suites[MAIN]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of the task."""
+        return next(iter(self.main.values())).axes
 
 
 @dataclass(frozen=True)
-class Cell:
+class Place:
     """One policy on one suite.
 
     Attributes:
         suite: Name of the suite; that of `front` for gains tuned with other weights.
-        task: What is scored.
+        job: What is scored.
     """
 
     suite: str
-    task: Task
+    job: Job
 
 
 def suites() -> dict[str, list[Scenario]]:
     """The frozen suites, and the control row: the main one with the joints still."""
-    found = {name: suite(name) for name in NAMES}
-    found[STILL] = [
-        replace(each, conditions=replace(each.conditions, motion=False)) for each in found[MAIN]
+    chosen = {name: suite(name) for name in NAMES}
+    chosen[STILL] = [
+        replace(each, conditions=replace(each.conditions, motion=False)) for each in chosen[MAIN]
     ]
-    return found
+    return chosen
 
 
 def everyone() -> list[Contender]:
@@ -56,92 +178,100 @@ def everyone() -> list[Contender]:
 
 def front() -> dict[str, list[Contender]]:
     """Policies with the shipped gains of other weights, from the smallest weight on, by id."""
-    found: dict[str, list[tuple[float, Contender]]] = {}
+    weighted: dict[str, list[tuple[float, Contender]]] = {}
     for file in sorted(FRONT.glob("*.json")):
         gains = read_gains(file)
-        row = found.setdefault(gains.policy, [])
+        row = weighted.setdefault(gains.policy, [])
         row.append((gains.weight, contender(f"{gains.policy}@{file}")))
     return {
-        id: [each for _, each in sorted(row, key=lambda pair: pair[0])] for id, row in found.items()
+        id: [each for _, each in sorted(row, key=lambda pair: pair[0])]
+        for id, row in weighted.items()
     }
 
 
-def cells(
+def places(
     contenders: Sequence[Contender],
     fronts: Mapping[str, Sequence[Contender]],
     chosen: Mapping[str, Sequence[Scenario]],
     time_limit: float = TIME_LIMIT,
-) -> list[Cell]:
+) -> list[Place]:
     """Every policy on every suite, and the fronts on the main one."""
     robot = Robot()
-    found = []
+    listed = []
     for name, scenarios in chosen.items():
         nominal = shared_nominal(robot, scenarios)
         besides = [each for row in fronts.values() for each in row] if name == MAIN else []
         for each in (*contenders, *besides):
-            found.append(Cell(name, Task(each, tuple(scenarios), nominal, robot, time_limit)))
-    return found
+            listed.append(Place(name, Job(each, tuple(scenarios), nominal, robot, time_limit)))
+    return listed
 
 
-def document(
-    scored: Sequence[tuple[Cell, Evaluation | Refusal]], fronts: Mapping[str, Sequence[Contender]]
-) -> Document:
-    """Rows by suite, best first; the fronts; and the reasons why rows are missing."""
+def leaderboard(
+    scored: Sequence[tuple[Place, Evaluation | Refusal]],
+    fronts: Mapping[str, Sequence[Contender]],
+    version: str,
+    provenance: Provenance,
+) -> LeaderboardResult:
+    """Rows by suite, best first; the fronts; and the reasons why rows are missing.
+
+    Raises:
+        UsageError: If no policy has a score on the main suite.
+    """
     refused: dict[str, dict[str, str]] = {}
     scores: dict[str, dict[str, tuple[Contender, Evaluation]]] = {}
-    for cell, outcome in scored:
-        contender = cell.task.contender
+    for place, outcome in scored:
+        contender = place.job.contender
         if isinstance(outcome, Refusal):
-            refused.setdefault(cell.suite, {})[contender.name] = outcome.reason
+            refused.setdefault(place.suite, {})[contender.name] = outcome.reason
         else:
-            scores.setdefault(cell.suite, {})[contender.name] = contender, outcome
+            scores.setdefault(place.suite, {})[contender.name] = contender, outcome
     main = scores.get(MAIN, {})
-    found = {
+    points = {
         id: [point(main.pop(each.name)[1]) for each in row if each.name in main]
         for id, row in fronts.items()
     }
     suites = {name: ranked(list(pairs.values())) for name, pairs in scores.items() if pairs}
-    return {"suites": suites, "front": found, "refused": refused}
+    return LeaderboardResult(
+        version=version,
+        suites=suites,
+        front={id: tuple(row) for id, row in points.items()},
+        refused=refused,
+        provenance=provenance,
+    )
 
 
-def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, dict[str, Any]]:
+def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing]:
     """The rows of a suite: competitors first, the smaller error first."""
-    order = sorted(scores, key=lambda pair: (pair[0].privileged, total(pair[1]).mean()))
-    rows = {contender.name: row(outcome, contender) for contender, outcome in order}
-    for (better, one), (worse, other) in pairwise(order):
-        if not worse.privileged:
-            rows[better.name]["beats_next"] = beaten(other, one)
-    return rows
 
+    def rank(pair: tuple[Contender, Evaluation]) -> tuple[bool, float]:
+        return pair[0].privileged, float(pair[1].total_error.mean())
 
-def total(scores: Evaluation) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Error in x plus error in y of each episode, m: what rows are ordered by."""
-    return scores.per_episode["max_error_x"] + scores.per_episode["max_error_y"]
-
-
-def row(scores: Evaluation, contender: Contender) -> dict[str, Any]:
-    """A policy's row: the summary of its scores, interquartile means, and the main episodes."""
-    found = scores.summary()
-    for name in ("max_error_x", "max_error_y"):
-        episodes = scores.per_episode[name]
-        found[name]["iqm"] = float(interquartile_mean(episodes))
-        found[name]["iqm_ci95"] = list(interval(interquartile_mean, episodes))
-    found["per_episode"] = {name: found["per_episode"][name] for name in (*KEPT, "failed")}
-    found["competitor"] = not contender.privileged
-    return found
-
-
-def beaten(worse: Evaluation, better: Evaluation) -> dict[str, Any]:
-    """Whether the data decide that a row is better than the next."""
-    found = compare(total(worse), total(better))
+    order = sorted(scores, key=rank)
+    leads = {
+        better.name: Lead.over(other, one)
+        for (better, one), (worse, other) in pairwise(order)
+        if not worse.privileged
+    }
     return {
-        "episodes": found.episodes,
-        "probability": found.improvement,
-        "ci95": list(found.improvement_ci95),
-        "decided": found.decided,
+        contender.name: standing(outcome, contender, leads.get(contender.name))
+        for contender, outcome in order
     }
 
 
-def point(scores: Evaluation) -> dict[str, float]:
-    """A point of the front: errors, m, and thrust variation, N/s."""
-    return {name: float(scores.per_episode[name].mean()) for name in KEPT}
+def standing(scores: Evaluation, contender: Contender, lead: Lead | None) -> Standing:
+    """A policy's row: the summary of its scores, interquartile means, and the main episodes."""
+    summary = scores.summary()
+    errors = [MAX_ERROR + axis for axis in axes_of(scores.per_episode)]
+    for name in errors:
+        episodes = scores.per_episode[name]
+        summary[name]["iqm"] = float(interquartile_mean(episodes))
+        summary[name]["iqm_ci95"] = list(interval(interquartile_mean, episodes))
+    kept = (*errors, "thrust_variation", "failed")
+    summary["per_episode"] = {name: summary["per_episode"][name] for name in kept}
+    return Standing.of(summary, competitor=not contender.privileged, beats_next=lead)
+
+
+def point(scores: Evaluation) -> FrontPoint:
+    """A policy's place in error against thrust variation."""
+    names = (*(MAX_ERROR + axis for axis in axes_of(scores.per_episode)), "thrust_variation")
+    return FrontPoint(means={name: float(scores.per_episode[name].mean()) for name in names})

@@ -8,71 +8,71 @@ from typing import Any
 
 import numpy as np
 
-from usm_baselines.benchmark.leaderboard import MAIN, Document
+from usm_baselines.benchmark.leaderboard import LeaderboardResult, Standing
+from usm_baselines.benchmark.results import axes_in
 from usm_gym.statistics import performance_profile
+from usm_gym.task.metrics import MAX_ERROR
 
 # Colour and line style, or colour and marker, tell thirty policies apart.
 COLOURS = 10
 STYLES = ("-", "--", ":")
 MARKERS = ("o", "s", "^")
 SHADE = 0.15
+# Width of a panel, inches.
+PANEL = 5.5
 
 
-def draw_all(found: Document, folder: Path) -> None:
+def draw_all(result: LeaderboardResult, folder: Path) -> None:
     """Draw errors, performance profiles and error against thrust variation into a folder; PNG."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    rows = found["suites"][MAIN]
     drawn = {
-        "errors": _errors(found["suites"]),
-        "profiles": _profiles(rows),
-        "variation": _variation(rows, found["front"]),
+        "errors": _errors(result),
+        "profiles": _profiles(result.main),
+        "variation": _variation(result),
     }
     for name, figure in drawn.items():
         figure.savefig(folder / f"{name}.png", dpi=120, metadata={"Software": None})
         plt.close(figure)
 
 
-def _errors(suites: Mapping[str, Any]) -> Any:
+def _errors(result: LeaderboardResult) -> Any:
     """Mean error of each policy on each suite, with its interval."""
     from matplotlib import pyplot as plt
 
-    names = list(suites[MAIN])
+    names, axes = list(result.main), result.axes
     height = 0.25 * len(names) + 1.2
     figure, panels = plt.subplots(
-        *(len(suites), 2),
-        figsize=(9, height * len(suites)),
+        *(len(result.suites), len(axes)),
+        figsize=(4.5 * len(axes), height * len(result.suites)),
         squeeze=False,
         sharex=True,
         layout="constrained",
     )
-    for line, (suite, rows) in zip(panels, suites.items(), strict=True):
-        for panel, axis in zip(line, "xy", strict=True):
+    for line, (suite, rows) in zip(panels, result.suites.items(), strict=True):
+        for panel, axis in zip(line, axes, strict=True):
             for place, name in enumerate(names):
                 if name in rows:
-                    score = rows[name][f"max_error_{axis}"]
-                    low, high = score["ci95"]
+                    error = rows[name].errors[axis]
+                    low, high = error.ci95
                     panel.plot([1e3 * low, 1e3 * high], [place, place], color="C0")
-                    panel.plot(1e3 * score["mean"], place, "o", color="C0", markersize=4)
+                    panel.plot(1e3 * error.mean, place, "o", color="C0", markersize=4)
             panel.set(xscale="log", xlabel=f"error in {axis} [mm]", ylim=(len(names) - 0.5, -0.5))
-            panel.set_yticks(range(len(names)), names if axis == "x" else [""] * len(names))
+            panel.set_yticks(range(len(names)), names if axis == axes[0] else [""] * len(names))
             panel.set_title(suite, fontsize=10)
             panel.grid(alpha=0.3)
     return figure
 
 
-def _profiles(rows: Mapping[str, Any]) -> Any:
+def _profiles(rows: Mapping[str, Standing]) -> Any:
     """Share of episodes with an error up to a threshold."""
-    from matplotlib import pyplot as plt
-
-    figure, panels = plt.subplots(1, 2, figsize=(11, 5), sharey=True, layout="constrained")
-    for panel, axis in zip(panels, "xy", strict=True):
+    figure, panels = _panels(rows, 5, sharey=True)
+    for axis, panel in panels.items():
         errors = {
-            name: 1e3 * np.array(row["per_episode"][f"max_error_{axis}"])
-            for name, row in rows.items()
+            name: 1e3 * np.array(row.per_episode[MAX_ERROR + axis]) for name, row in rows.items()
         }
         every = np.concatenate(list(errors.values()))
         thresholds = np.geomspace(max(every.min(), 1e-3), every.max(), 200)
@@ -85,30 +85,27 @@ def _profiles(rows: Mapping[str, Any]) -> Any:
             )
         panel.set(xscale="log", xlabel=f"error in {axis} [mm]")
         panel.grid(alpha=0.3)
-    panels[0].set(ylabel="share of episodes with at most this error")
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), fontsize=8, ncols=6, loc="outside lower center"
-    )
+    first = next(iter(panels.values()))
+    first.set(ylabel="share of episodes with at most this error")
+    _name(figure, first)
     return figure
 
 
-def _variation(rows: Mapping[str, Any], front: Mapping[str, Any]) -> Any:
+def _variation(result: LeaderboardResult) -> Any:
     """Error against thrust variation, and the fronts of the tuned laws."""
-    from matplotlib import pyplot as plt
-
-    figure, panels = plt.subplots(1, 2, figsize=(11, 6), layout="constrained")
-    for panel, axis in zip(panels, "xy", strict=True):
-        for number, (name, row) in enumerate(rows.items()):
-            variation = row["thrust_variation"]["mean"]
+    figure, panels = _panels(result.main, 6)
+    for axis, panel in panels.items():
+        for number, (name, row) in enumerate(result.main.items()):
+            variation = row.metrics["thrust_variation"].mean
             if variation > 0:
-                error = 1e3 * row[f"max_error_{axis}"]["mean"]
+                error = 1e3 * row.errors[axis].mean
                 marker = MARKERS[number // COLOURS % len(MARKERS)]
                 color = _style(number)["color"]
                 panel.plot(variation, error, marker, color=color, linestyle="none", label=name)
-        for name, points in front.items():
+        for name, points in result.front.items():
             panel.plot(
-                [each["thrust_variation"] for each in points],
-                [1e3 * each[f"max_error_{axis}"] for each in points],
+                [each.thrust_variation for each in points],
+                [1e3 * each.errors[axis] for each in points],
                 ".-",
                 color="0.5",
                 linewidth=1,
@@ -122,10 +119,26 @@ def _variation(rows: Mapping[str, Any], front: Mapping[str, Any]) -> Any:
             ylabel=f"error in {axis} [mm]",
         )
         panel.grid(alpha=0.3)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), fontsize=8, ncols=6, loc="outside lower center"
-    )
+    _name(figure, next(iter(panels.values())))
     return figure
+
+
+def _panels(rows: Mapping[str, Standing], height: float, **options: Any) -> tuple[Any, Any]:
+    """A figure, and its panels by axis."""
+    from matplotlib import pyplot as plt
+
+    axes = axes_in(rows.values())
+    size = PANEL * len(axes), height
+    figure, (panels,) = plt.subplots(
+        1, len(axes), figsize=size, squeeze=False, layout="constrained", **options
+    )
+    return figure, dict(zip(axes, panels, strict=True))
+
+
+def _name(figure: Any, panel: Any) -> None:
+    """Name what a panel shows, below the figure."""
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=8, ncols=6, loc="outside lower center")
 
 
 def _style(number: int) -> dict[str, Any]:

@@ -6,134 +6,128 @@ import csv
 import io
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-from usm_baselines.benchmark.leaderboard import MAIN, Document
+from usm_baselines.benchmark.leaderboard import Lead, LeaderboardResult, Standing
+from usm_baselines.benchmark.results import Summary, axes_in
 from usm_gym.statistics import FEWEST_EPISODES
-from usm_gym.support.text import figures, mm
+from usm_gym.support.text import figures, listed, mm
 from usm_gym.support.validation import require
 
 MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
-COLUMNS = (
-    "x, mm",
-    "y, mm",
-    "middle half x",
-    "middle half y",
-    "worst x",
-    "worst y",
-    "thrust, N",
-    "variation, N/s",
-    "lost",
-    "beats the next",
-)
-BRIEF_COLUMNS = ("x, mm", "y, mm", "worst x / y", "variation, N/s", "lost")
 # Whose gains are kept in the README beside better ones: the paper's.
 PAPER = ("sta", "pd")
+# Metrics without columns in the CSV file.
+NO_COLUMN = ("saturation_share",)
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes with its 95 % interval, mean of
-the middle half of the episodes, worst episode. Rows are ordered by the sum of the means in x and y.
+the middle half of the episodes, worst episode. Rows are ordered by the sum of the means in {axes}.
 "Beats the next" says whether the interval of the paired difference to the next row leaves out 0,
 and with what probability an episode goes better.
 """
-SCORES = (
-    *(f"{name}_{axis}" for name in ("max_error", "settled_error", "rms_error") for axis in "xy"),
-    "heading_error",
-    "thrust_effort",
-    "thrust_variation",
-)
 
 
-def table(rows: Mapping[str, Any]) -> str:
+def table(rows: Mapping[str, Standing]) -> str:
     """The rows of a suite as Markdown."""
-    lines = _head(COLUMNS)
-    for id, each in rows.items():
-        errors = [each[f"max_error_{axis}"] for axis in "xy"]
-        cells = _means(errors) + [mm(e["iqm"]) for e in errors] + [mm(e["worst"]) for e in errors]
-        cells += [figures(each[key]["mean"]) for key in ("thrust_effort", "thrust_variation")]
-        beats = each.get("beats_next")
-        decision = "" if beats is None else f"{said(beats)} ({beats['probability']:.2f})"
-        lines.append(_line(id, each, [*cells, str(each["failures"]), decision]))
+    axes = axes_in(rows.values())
+    columns = [f"{axis}, mm" for axis in axes]
+    columns += [f"{what} {axis}" for what in ("middle half", "worst") for axis in axes]
+    lines = _head([*columns, "thrust, N", "variation, N/s", "lost", "beats the next"])
+    for id, row in rows.items():
+        errors = row.errors.values()
+        cells = [_mean(each) for each in errors]
+        cells += [mm(each.iqm) for each in row.middle] + [mm(each.worst) for each in errors]
+        cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
+        lead = row.beats_next
+        decision = "" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})"
+        lines.append(_line(id, row, [*cells, str(row.failures), decision]))
     return "\n".join(lines) + "\n"
 
 
-def brief_table(rows: Mapping[str, Any]) -> str:
+def brief_table(rows: Mapping[str, Standing]) -> str:
     """The README's table: of each law the better gains, and the paper's, in fewer columns."""
-    lines = _head(BRIEF_COLUMNS)
+    axes = axes_in(rows.values())
+    columns = [*(f"{axis}, mm" for axis in axes), f"worst {' / '.join(axes)}"]
+    lines = _head([*columns, "variation, N/s", "lost"])
     laws = set()
-    for id, each in rows.items():
+    for id, row in rows.items():
         law = id.removesuffix("-tuned")
         if law in laws and id not in PAPER:
             continue
         laws.add(law)
-        errors = [each[f"max_error_{axis}"] for axis in "xy"]
-        worst = " / ".join(mm(e["worst"]) for e in errors)
-        variation = figures(each["thrust_variation"]["mean"])
-        lines.append(_line(id, each, [*_means(errors), worst, variation, str(each["failures"])]))
+        errors = row.errors.values()
+        worst = " / ".join(mm(each.worst) for each in errors)
+        variation = figures(row.metrics["thrust_variation"].mean)
+        cells = [*map(_mean, errors), worst, variation, str(row.failures)]
+        lines.append(_line(id, row, cells))
     return "\n".join(lines) + "\n"
 
 
-def _head(columns: Sequence[str]) -> list[str]:
-    return [f"| policy | {' | '.join(columns)} |", "|---|" + "---:|" * len(columns)]
-
-
-def _line(id: str, row: Mapping[str, Any], cells: Sequence[str]) -> str:
-    name = id if row["competitor"] else f"{id} (no competitor)"
-    return "| " + " | ".join([name, *cells]) + " |"
-
-
-def _means(errors: Sequence[Mapping[str, Any]]) -> list[str]:
-    return [f"{mm(e['mean'])} [{mm(e['ci95'][0])}, {mm(e['ci95'][1])}]" for e in errors]
-
-
-def said(beats: Mapping[str, Any]) -> str:
+def in_short(lead: Lead) -> str:
     """Whether the data decide, in a word or two."""
-    if beats["episodes"] < FEWEST_EPISODES:
+    if lead.episodes < FEWEST_EPISODES:
         return "too few"
-    return "yes" if beats["decided"] else "undecided"
+    return "yes" if lead.decided else "undecided"
 
 
-def markdown(found: Document) -> str:
+def markdown(result: LeaderboardResult) -> str:
     """The whole leaderboard as Markdown."""
-    parts = [f"# Leaderboard of usm-gym {found['version']}\n", LEGEND]
-    for name, rows in found["suites"].items():
-        episodes = len(next(iter(rows.values()))["per_episode"]["failed"])
+    legend = LEGEND.format(axes=listed(result.axes))
+    parts = [f"# Leaderboard of usm-gym {result.version}\n", legend]
+    for name, rows in result.suites.items():
+        episodes = next(iter(rows.values())).episodes
         parts.append(f"## {name} ({episodes} episodes)\n")
         parts.append(table(rows))
-        for id, reason in found["refused"].get(name, {}).items():
+        for id, reason in result.refused.get(name, {}).items():
             parts.append(f"{id} is refused: {reason}\n")
     return "\n".join(parts)
 
 
-def readme_block(found: Document) -> str:
+def readme_block(result: LeaderboardResult) -> str:
     """The main suite's short table between its marks."""
-    return f"{MARKS[0]}\n{brief_table(found['suites'][MAIN])}{MARKS[1]}\n"
+    return f"{MARKS[0]}\n{brief_table(result.main)}{MARKS[1]}\n"
 
 
-def with_table(page: str, found: Document) -> str:
+def with_table(page: str, result: LeaderboardResult) -> str:
     """A page with the main suite's short table put between its marks.
 
     Raises:
         ValueError: If the page lacks the marks.
     """
     pattern = re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1]) + "\n"
-    block = readme_block(found)
+    block = readme_block(result)
     changed, count = re.subn(pattern, lambda match: block, page, flags=re.DOTALL)
     require(count == 1, "marks of the table", count, f"one pair, {MARKS[0]} to {MARKS[1]}")
     return changed
 
 
-def csv_text(found: Document) -> str:
+def csv_text(result: LeaderboardResult) -> str:
     """One line for each policy on each suite; errors in m, thrust in N, variation in N/s."""
+    scores = [name for name in next(iter(result.main.values())).metrics if name not in NO_COLUMN]
     head = ["suite", "policy", "competitor", "failures"]
-    for name in SCORES:
+    for name in scores:
         head += [name, f"{name}_low", f"{name}_high", f"{name}_worst"]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(head)
-    for suite_name, rows in found["suites"].items():
-        for id, each in rows.items():
-            line = [suite_name, id, each["competitor"], each["failures"]]
-            for name in SCORES:
-                line += [each[name]["mean"], *each[name]["ci95"], each[name]["worst"]]
+    for suite, rows in result.suites.items():
+        for id, row in rows.items():
+            line: list[object] = [suite, id, row.competitor, row.failures]
+            for name in scores:
+                summary = row.metrics[name]
+                line += [summary.mean, *summary.ci95, summary.worst]
             writer.writerow(line)
     return out.getvalue()
+
+
+def _head(columns: Sequence[str]) -> list[str]:
+    return [f"| policy | {' | '.join(columns)} |", "|---|" + "---:|" * len(columns)]
+
+
+def _line(id: str, row: Standing, cells: Sequence[str]) -> str:
+    name = id if row.competitor else f"{id} (no competitor)"
+    return "| " + " | ".join([name, *cells]) + " |"
+
+
+def _mean(error: Summary) -> str:
+    low, high = error.ci95
+    return f"{mm(error.mean)} [{mm(low)}, {mm(high)}]"

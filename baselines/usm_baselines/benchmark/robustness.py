@@ -6,16 +6,21 @@ only the control period is known to them whatever it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from usm_baselines.benchmark.scoring import TIME_LIMIT, Refusal, Task, shared_nominal
+from pydantic import Discriminator, Field, Tag
+
+from usm_baselines.benchmark.results import Scores, axes_in, require_alike
+from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal, shared_nominal
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import Evaluation
 from usm_gym.robot import Robot
-from usm_gym.support.validation import require
+from usm_gym.support.results import Provenance, Result
+from usm_gym.support.validation import Number, require, validated
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.stored_scenario import StoredScenarios
 
 
 @dataclass(frozen=True)
@@ -101,19 +106,104 @@ QUANTITIES = {
 }
 
 
-def tasks(
+@validated
+class ScoredPoint(Scores):
+    """Scores at one value of the quantity.
+
+    Attributes:
+        value: The value.
+    """
+
+    order: ClassVar[tuple[str, ...]] = ("value", "metrics", "failures", "per_episode")
+    value: Number
+
+
+@validated
+class RefusedPoint:
+    """A value of the quantity at which a policy has no scores.
+
+    Attributes:
+        value: The value.
+        refused: Why.
+    """
+
+    value: Number
+    refused: str
+
+
+def _kind_of_point(point: Any) -> str:
+    refused = "refused" in point if isinstance(point, Mapping) else isinstance(point, RefusedPoint)
+    return "refused" if refused else "scored"
+
+
+Point = Annotated[
+    Annotated[ScoredPoint, Tag("scored")] | Annotated[RefusedPoint, Tag("refused")],
+    Discriminator(_kind_of_point),
+]
+
+
+@validated
+class RobustnessResult(Result):
+    """Errors against one quantity, as `usm robustness` writes them.
+
+    Attributes:
+        quantity: Name of the quantity.
+        label: What it is, with its unit.
+        values: Its values.
+        scenarios: The scenarios before anything is varied.
+        results: For each policy a point at each value.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "robustness"
+    quantity: str
+    label: str
+    values: Annotated[tuple[Number, ...], Field(min_length=1)]
+    scenarios: StoredScenarios
+    results: Mapping[str, tuple[Point, ...]]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        """Refuse curves at other values, and points that cannot be compared."""
+        for name, points in self.results.items():
+            values = tuple(point.value for point in points)
+            require(values == self.values, f"values of {name}", values, f"{self.values}")
+        require_alike(self._scored)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of the task; none if no policy has scores."""
+        return axes_in(self._scored)
+
+    @property
+    def refused(self) -> dict[str, str]:
+        """Why there are no scores, by policy and value."""
+        return {
+            f"{name} at {point.value:g}": point.refused
+            for name, points in self.results.items()
+            for point in points
+            if isinstance(point, RefusedPoint)
+        }
+
+    @property
+    def _scored(self) -> list[ScoredPoint]:
+        points = [point for row in self.results.values() for point in row]
+        return [point for point in points if isinstance(point, ScoredPoint)]
+
+
+def jobs(
     contenders: Sequence[Contender],
     scenarios: Sequence[Scenario],
     quantity: Quantity,
     values: Sequence[float],
     time_limit: float = TIME_LIMIT,
-) -> list[Task]:
-    """One task for each policy and value, values of one policy side by side."""
+) -> list[Job]:
+    """One job for each policy and value, values of one policy side by side."""
     robot = Robot()
     nominal = shared_nominal(robot, scenarios)
     varied = [tuple(quantity.vary(each, value) for each in scenarios) for value in values]
     return [
-        Task(
+        Job(
             each,
             batch,
             replace(nominal, control_period=batch[0].conditions.control_period),
@@ -127,38 +217,40 @@ def tasks(
 
 def curves(
     names: Sequence[str], values: Sequence[float], outcomes: Sequence[Evaluation | Refusal]
-) -> dict[str, list[dict[str, Any]]]:
-    """For each policy a list over the values: its summary, or why there is none."""
-    found: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
-    places = [(name, value) for name in names for value in values]
-    for (name, value), outcome in zip(places, outcomes, strict=True):
-        if isinstance(outcome, Refusal):
-            found[name].append({"value": value, "refused": outcome.reason})
-        else:
-            found[name].append({"value": value, **outcome.summary()})
-    return found
+) -> dict[str, tuple[ScoredPoint | RefusedPoint, ...]]:
+    """For each policy its scores at each value, or why there are none."""
+    points = [
+        RefusedPoint(value=value, refused=outcome.reason)
+        if isinstance(outcome, Refusal)
+        else ScoredPoint.of(outcome.summary(), value=value)
+        for value, outcome in zip([*values] * len(names), outcomes, strict=True)
+    ]
+    size = len(values)
+    return {name: tuple(points[size * k : size * (k + 1)]) for k, name in enumerate(names)}
 
 
-def draw(found: dict[str, list[dict[str, Any]]], label: str) -> Any:
-    """Draw errors in x and y against the quantity, with their intervals; a matplotlib figure."""
+def draw(result: RobustnessResult) -> Any:
+    """Draw the errors in each axis against the quantity, with their intervals, by matplotlib."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, panels = plt.subplots(1, 2, figsize=(10, 4.5), layout="constrained")
-    for panel, axis in zip(panels, "xy", strict=True):
-        for number, (name, points) in enumerate(found.items()):
-            known = [each for each in points if "refused" not in each]
-            scores = [each[f"max_error_{axis}"] for each in known]
-            places = [each["value"] for each in known]
+    columns = max(len(result.axes), 1)
+    figure, (panels,) = plt.subplots(
+        1, columns, figsize=(5 * columns, 4.5), squeeze=False, layout="constrained"
+    )
+    for panel, axis in zip(panels, result.axes, strict=False):
+        for number, (name, points) in enumerate(result.results.items()):
+            scored = [each for each in points if isinstance(each, ScoredPoint)]
+            errors = [each.errors[axis] for each in scored]
+            places = [each.value for each in scored]
             colour = f"C{number % 10}"
-            panel.plot(
-                places, [1e3 * each["mean"] for each in scores], ".-", color=colour, label=name
-            )
-            low, high = ([1e3 * each["ci95"][side] for each in scores] for side in (0, 1))
+            panel.plot(places, [1e3 * e.mean for e in errors], ".-", color=colour, label=name)
+            low, high = ([1e3 * e.ci95[side] for e in errors] for side in (0, 1))
             panel.fill_between(places, low, high, color=colour, alpha=0.2, linewidth=0)
-        panel.set(yscale="log", xlabel=label, ylabel=f"error in {axis} [mm]")
+        panel.set(yscale="log", xlabel=result.label, ylabel=f"error in {axis} [mm]")
         panel.grid(alpha=0.3)
-    panels[0].legend(fontsize=8)
+    if result.axes:
+        panels[0].legend(fontsize=8)
     return figure

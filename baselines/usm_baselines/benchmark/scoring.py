@@ -1,4 +1,4 @@
-"""Many policies on many scenarios: independent tasks, each kept in a file as soon as it is done.
+"""Many policies on many scenarios: independent jobs, each kept in a file as soon as it is done.
 
 What a controller does wrong costs its own row and no other: it is refused with the reason.
 """
@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from usm_baselines.contender import Contender
@@ -29,7 +29,14 @@ from usm_gym.policy import Policy
 from usm_gym.robot import Robot
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
-from usm_gym.support.validation import CONFIG, Number, Switch, in_one_line, require
+from usm_gym.support.validation import (
+    CONFIG,
+    Number,
+    Switch,
+    UsageError,
+    in_one_line,
+    require,
+)
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Scenario
 from usm_gym.world import world_of
@@ -50,7 +57,7 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class Task:
+class Job:
     """A policy and the scenarios on which it is scored.
 
     Attributes:
@@ -110,59 +117,59 @@ _KEPT = TypeAdapter(_Kept)
 
 
 def score_all(
-    tasks: Sequence[Task],
+    jobs: Sequence[Job],
     workers: int = 1,
     cache: Path | None = None,
     progress: Callable[[int], object] = lambda episodes: None,
 ) -> list[Evaluation | Refusal]:
-    """Score every task.
+    """Score every job.
 
     Args:
-        tasks: The tasks.
+        jobs: The jobs.
         workers: Number of processes; without effect on the result.
-        cache: Folder in which the scores of a task are looked for, and kept when it is done; there
+        cache: Folder in which the scores of a job are looked for, and kept when it is done; there
             are none of refused policies, nor of those whose code is not known. A file that is
             damaged is written anew, after a warning.
         progress: Called with the number of episodes done since the last call.
 
     Returns:
-        Scores or the reason why there are none, in the order of the tasks.
+        Scores or the reason why there are none, in the order of the jobs.
     """
     require(workers >= 1, "workers", workers, "1 or more")
     outcomes: dict[int, Evaluation | Refusal] = {}
-    batches: list[tuple[Task, int, int]] = []
+    batches: list[tuple[Job, int, int]] = []
     waiting: dict[int, dict[int, Evaluation | Refusal]] = {}
     places = []
-    for index, task in enumerate(tasks):
-        known = _read(cache, task)
+    for index, job in enumerate(jobs):
+        known = _read(cache, job)
         if known is not None:
             outcomes[index] = known
-            progress(len(task.scenarios))
+            progress(len(job.scenarios))
             continue
         waiting[index] = {}
-        for first in range(0, len(task.scenarios), BATCH):
-            batches.append((task, first, first + BATCH))
+        for first in range(0, len(job.scenarios), BATCH):
+            batches.append((job, first, first + BATCH))
             places.append(index)
     for number, outcome in parallel.results(score_batch, batches, workers):
-        task, first, last = batches[number]
+        job, first, last = batches[number]
         index = places[number]
         parts = waiting[index]
         parts[first] = outcome
-        progress(len(task.scenarios[first:last]))
-        if len(parts) == len(range(0, len(task.scenarios), BATCH)):
+        progress(len(job.scenarios[first:last]))
+        if len(parts) == len(range(0, len(job.scenarios), BATCH)):
             outcomes[index] = _whole([parts[first] for first in sorted(parts)])
-            _write(cache, task, outcomes[index])
-    return [outcomes[index] for index in range(len(tasks))]
+            _write(cache, job, outcomes[index])
+    return [outcomes[index] for index in range(len(jobs))]
 
 
-def score_batch(task: Task, first: int, last: int) -> Evaluation | Refusal:
-    """Score the episodes `first` to `last`, this one left out, of a task side by side."""
-    scenarios = task.scenarios[first:last]
+def score_batch(job: Job, first: int, last: int) -> Evaluation | Refusal:
+    """Score the episodes `first` to `last`, this one left out, of a job side by side."""
+    scenarios = job.scenarios[first:last]
     try:
-        policy = task.contender.make(task.nominal)
-        if task.contender.identity is None:  # ours are never refused for a slow machine
-            policy = Timed(policy, task.time_limit)
-        return evaluate(policy, scenarios, robot=task.robot)
+        policy = job.contender.make(job.nominal)
+        if job.contender.identity is None:  # ours are never refused for a slow machine
+            policy = Timed(policy, job.time_limit)
+        return evaluate(policy, scenarios, robot=job.robot)
     except (Exception, SystemExit) as error:  # whatever a controller may do
         kind = "" if isinstance(error, ValueError | TimeoutError) else f"{type(error).__name__}: "
         return Refusal(kind + in_one_line(error))
@@ -229,18 +236,18 @@ def _whole(parts: Sequence[Evaluation | Refusal]) -> Evaluation | Refusal:
     return joined(scores)
 
 
-def _read(cache: Path | None, task: Task) -> Evaluation | None:
-    """The scores of a task that are kept; none, and a warning, if they are not what was written."""
-    if cache is None or task.key is None or not (file := cache / f"{task.key}.json").exists():
+def _read(cache: Path | None, job: Job) -> Evaluation | None:
+    """The scores of a job that are kept; None, with a warning if the file is damaged."""
+    if cache is None or job.key is None or not (file := cache / f"{job.key}.json").exists():
         return None
     try:
         kept = _KEPT.validate_python(read_json(file))
-        names, episodes = list(kept.per_episode), len(task.scenarios)
-        expected = metric_names(world_of(task.scenarios[0].body))
+        names, episodes = list(kept.per_episode), len(job.scenarios)
+        expected = metric_names(world_of(job.scenarios[0].body))
         require(names == expected, "per_episode", names, ", ".join(expected))
         lengths = {len(kept.failed), *map(len, kept.per_episode.values())}
         require(lengths == {episodes}, "number of episodes", sorted(lengths), str(episodes))
-    except (ValueError, OSError) as error:
+    except (UsageError, ValidationError, OSError) as error:
         reason = f"{file} is damaged, and the scores are computed again: {in_one_line(error)}"
         warnings.warn(reason, stacklevel=3)
         return None
@@ -248,10 +255,10 @@ def _read(cache: Path | None, task: Task) -> Evaluation | None:
     return Evaluation(scores, np.array(kept.failed))
 
 
-def _write(cache: Path | None, task: Task, outcome: Evaluation | Refusal) -> None:
-    if cache is None or task.key is None or isinstance(outcome, Refusal):
+def _write(cache: Path | None, job: Job, outcome: Evaluation | Refusal) -> None:
+    if cache is None or job.key is None or isinstance(outcome, Refusal):
         return
     cache.mkdir(parents=True, exist_ok=True)
     scores = {name: values.tolist() for name, values in outcome.per_episode.items()}
-    data = {"policy": task.contender.name, "per_episode": scores, "failed": outcome.failed.tolist()}
-    write_json(cache / f"{task.key}.json", data)
+    data = {"policy": job.contender.name, "per_episode": scores, "failed": outcome.failed.tolist()}
+    write_json(cache / f"{job.key}.json", data)

@@ -24,7 +24,7 @@ from optuna.trial import TrialState
 from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
-from usm_baselines.benchmark.scoring import Refusal, Task, score_all, score_batch, shared_nominal
+from usm_baselines.benchmark.scoring import Job, Refusal, score_all, score_batch, shared_nominal
 from usm_baselines.contender import registered
 from usm_baselines.gains import Budget, GainsFile
 from usm_baselines.registry import entry, tuned
@@ -34,7 +34,7 @@ from usm_gym.robot import Robot
 from usm_gym.support import parallel
 from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
-from usm_gym.support.validation import in_one_line, require
+from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
@@ -50,7 +50,8 @@ FAILED = 1e4
 # Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.
 STARTUP_TRIALS = 2 * ROUND
 # Attributes of a trial: its objective, or None if it was given up early; and why it has no score.
-FOUND, REFUSED = "found", "refused"
+# The names stand in the storages of tunings that go on.
+OBJECTIVE, REFUSED = "found", "refused"
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Problem:
         require(self.space, "policy", self.policy, "one that declares which gains are tuned")
         require(self.budget.trials >= 1, "trials", self.budget.trials, "1 or more")
         require(self.budget.episodes >= 1, "episodes", self.budget.episodes, "1 or more")
-        require(self.weight >= 0, "weight", self.weight, "a number >= 0")
+        require(0 <= self.weight <= 1000, "weight", self.weight, "0 to 1000")
         require(self.seed >= 0, "seed", self.seed, "0 or more")
 
     @property
@@ -103,17 +104,17 @@ class Problem:
             for episode in range(self.budget.episodes)
         )
 
-    def task(self, gains: dict[str, float], purpose: int) -> Task:
+    def job(self, gains: dict[str, float], purpose: int) -> Job:
         """The policy with some gains on these scenarios."""
         file = GainsFile(self.policy, gains, self.budget, self.weight)
         scenarios, robot = self.scenarios(purpose), Robot()
         contender = registered(self.policy, tuned(file))
-        return Task(contender, scenarios, shared_nominal(robot, scenarios), robot)
+        return Job(contender, scenarios, shared_nominal(robot, scenarios), robot)
 
 
 @dataclass(frozen=True)
-class Result:
-    """What a tuning has found.
+class Optimum:
+    """What came of a tuning.
 
     Attributes:
         gains: The best gains.
@@ -131,7 +132,7 @@ class Result:
 
 
 def objective(outcome: Evaluation | Refusal, weight: float = VARIATION_WEIGHT) -> float:
-    """Mean max_error_x + max_error_y in mm, plus the cost of thrust variation in mm.
+    """Mean of the largest errors of all axes, added up, plus the cost of thrust variation, mm.
 
     Args:
         outcome: Scores, or a refusal, which costs more than any loss.
@@ -139,9 +140,8 @@ def objective(outcome: Evaluation | Refusal, weight: float = VARIATION_WEIGHT) -
     """
     if isinstance(outcome, Refusal):
         return FAILED
-    error = outcome.per_episode["max_error_x"] + outcome.per_episode["max_error_y"]
     variation = outcome.per_episode["thrust_variation"]
-    return float(np.mean(1e3 * error + weight * variation))
+    return float(np.mean(1e3 * outcome.total_error + weight * variation))
 
 
 def tune(
@@ -149,7 +149,7 @@ def tune(
     storage: str | None = None,
     workers: int = 1,
     progress: Callable[[int, float], object] = lambda trials, best: None,
-) -> Result:
+) -> Optimum:
     """Look for the gains with the smallest objective.
 
     Every trial meets the first scenarios; only those that are no worse there than the median of the
@@ -164,7 +164,7 @@ def tune(
         progress: Called with the number of trials that are done, and the best objective, mm.
 
     Returns:
-        What was found.
+        The best gains and what they are worth.
 
     Raises:
         ValueError: If the storage cannot be used, or no trial has a score.
@@ -177,10 +177,10 @@ def tune(
         reason = study.best_trial.user_attrs.get(REFUSED)
         pruned = len(study.get_trials(deepcopy=False, states=[TrialState.PRUNED]))
     if value >= FAILED:
-        raise ValueError(f"no trial of {problem.policy} has a score: {reason}")
-    checks = [problem.task(gains, VALIDATION) for gains in ({}, best)]
+        raise UsageError(f"no trial of {problem.policy} has a score: {reason}")
+    checks = [problem.job(gains, VALIDATION) for gains in ({}, best)]
     start, validation = (objective(each, problem.weight) for each in score_all(checks, workers))
-    return Result(best, value, start, validation, pruned)
+    return Optimum(best, value, start, validation, pruned)
 
 
 @contextmanager
@@ -194,7 +194,7 @@ def _usable(storage: str | None, *faults: type[Exception]) -> Iterator[None]:
             cause = cause.__cause__
         with suppress(ArgumentError):
             storage = make_url(storage or "").render_as_string(hide_password=True)
-        raise ValueError(f"storage {storage} cannot be used: {in_one_line(cause)}") from error
+        raise UsageError(f"storage {storage} cannot be used: {in_one_line(cause)}") from error
 
 
 def _held(storage: str | None, study: str) -> AbstractContextManager[None]:
@@ -244,45 +244,45 @@ def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
         for name, each in problem.space.items()
     }
     trials = [study.ask(space) for _ in range(size)]
-    tasks = [problem.task(trial.params, TUNING) for trial in trials]
-    begun = _scored(tasks, 0, FIRST_EPISODES, workers)
+    jobs = [problem.job(trial.params, TUNING) for trial in trials]
+    begun = _scored(jobs, 0, FIRST_EPISODES, workers)
     for index, trial in enumerate(trials):
         trial.report(objective(begun[index], problem.weight), 0)
     going = [index for index, trial in enumerate(trials) if not trial.should_prune()]
     outcomes = {index: begun[index] for index in going}
     if problem.budget.episodes > FIRST_EPISODES:
-        rest = _scored([tasks[index] for index in going], FIRST_EPISODES, None, workers)
+        rest = _scored([jobs[index] for index in going], FIRST_EPISODES, None, workers)
         outcomes = {index: _joined(begun[index], rest[k]) for k, index in enumerate(going)}
     for index, trial in enumerate(trials):
         outcome = outcomes.get(index)
         if isinstance(outcome, Refusal):
             trial.set_user_attr(REFUSED, outcome.reason)
-        trial.set_user_attr(FOUND, outcome and objective(outcome, problem.weight))
+        trial.set_user_attr(OBJECTIVE, outcome and objective(outcome, problem.weight))
     _tell(study)
 
 
 def _tell(study: Study) -> None:
-    """End the trials of a round: all with what was found, or, if that is not complete, as failed.
+    """End the trials of a round, with their objectives, or as failed if one has none.
 
-    What was found is kept with every trial before the first of them ends. So a round during which
-    a tuning was killed counts as a whole or not at all, and what follows is the same.
+    Every trial keeps its objective before the first of them ends. So a round during which a tuning
+    was killed counts as a whole or not at all, and what follows is the same.
     """
     trials = study.get_trials(deepcopy=False, states=[TrialState.RUNNING])
-    complete = all(FOUND in trial.user_attrs for trial in trials)
+    complete = all(OBJECTIVE in trial.user_attrs for trial in trials)
     # Those without come last, so that a round that is not complete stays so until it is gone.
-    for trial in sorted(trials, key=lambda trial: FOUND not in trial.user_attrs):
+    for trial in sorted(trials, key=lambda trial: OBJECTIVE not in trial.user_attrs):
         if not complete:
             study.tell(trial.number, state=TrialState.FAIL)
-        elif trial.user_attrs[FOUND] is None:
+        elif trial.user_attrs[OBJECTIVE] is None:
             study.tell(trial.number, state=TrialState.PRUNED)
         else:
-            study.tell(trial.number, trial.user_attrs[FOUND])
+            study.tell(trial.number, trial.user_attrs[OBJECTIVE])
 
 
 def _scored(
-    tasks: Sequence[Task], first: int, last: int | None, workers: int
+    jobs: Sequence[Job], first: int, last: int | None, workers: int
 ) -> dict[int, Evaluation | Refusal]:
-    return dict(parallel.results(score_batch, [(task, first, last) for task in tasks], workers))
+    return dict(parallel.results(score_batch, [(job, first, last) for job in jobs], workers))
 
 
 def _joined(first: Evaluation | Refusal, second: Evaluation | Refusal) -> Evaluation | Refusal:
@@ -293,8 +293,8 @@ def _joined(first: Evaluation | Refusal, second: Evaluation | Refusal) -> Evalua
 
 def _start(problem: Problem) -> dict[str, float]:
     """The policy's own gains, as far as they lie in the space."""
-    task = problem.task({}, TUNING)
-    gains = getattr(task.contender.make(task.nominal), "gains", None)
+    job = problem.job({}, TUNING)
+    gains = getattr(job.contender.make(job.nominal), "gains", None)
     own = {} if gains is None else gains._asdict()
     return {
         name: min(max(own[name], each.low), each.high)

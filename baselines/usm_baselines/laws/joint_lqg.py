@@ -6,6 +6,7 @@ one that would take the linear model, its last command held, to where the nomina
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -93,7 +94,7 @@ class JointLQG(LQG):
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
         self._predictor = Predictor(nominal, self._linear.correction)
 
-    @property
+    @cached_property
     def law_shape(self) -> tuple[int, ...]:
         """The state of the predictor."""
         return (self._predictor.size,)

@@ -14,6 +14,7 @@ model).
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -120,7 +121,7 @@ class MPC(ScriptedPolicy):
             ]
         )
 
-    @property
+    @cached_property
     def law_shape(self) -> tuple[int, ...]:
         """The state of the predictor."""
         return (self._predictor.size,)

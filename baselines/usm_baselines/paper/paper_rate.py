@@ -19,13 +19,17 @@ from usm_gym.plant.step import move_water, physics_step
 from usm_gym.plant.thrusters import allocate, allocation_matrix, saturated
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
-from usm_gym.support.validation import require
+from usm_gym.support.validation import UsageError
 from usm_gym.task.guidance import *
 from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.scenario import Scenario
 
 Array = NDArray[np.float64]
 SUPER_TWISTING = -1
+
+
+class LostRobotError(UsageError):
+    """A run in which the robot was lost."""
 
 
 class Law(NamedTuple):
@@ -101,7 +105,7 @@ def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None
         robot: The robot; without one, the scenario's.
 
     Raises:
-        ValueError: If the robot is lost.
+        LostRobotError: If the robot is lost.
     """
     conditions = scenario.conditions
     body = robot or scenario.body
@@ -112,12 +116,10 @@ def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None
     record = record_for(scenario.steps * conditions.substeps // every, body.links)
     blocks, plant = simulation.fleet.blocks, simulation.shared
     closed_loop(blocks, plant, body.total_mass, law, noise, every, record)
-    require(
-        np.abs(record.error).max() <= LOST_ERROR,
-        "control_period",
-        conditions.control_period,
-        "a period at which the robot is not lost",
-    )
+    if not np.abs(record.error).max() <= LOST_ERROR:
+        period = conditions.control_period
+        allowed = "a period at which the robot is not lost"
+        raise LostRobotError(f"control_period is {period}; allowed: {allowed}")
     return record
 
 

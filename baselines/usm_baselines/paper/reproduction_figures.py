@@ -11,12 +11,11 @@ import numpy as np
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.paper.convergence import Start, cascade, disturbance_rate, growth
 from usm_baselines.paper.paper_rate import Array, Law, Record, simulate
-from usm_baselines.paper.reproduction import IMPLICIT_STEP, SAMPLE_TIME, at_step
+from usm_baselines.paper.reproduction import AXES, IMPLICIT_STEP, SAMPLE_TIME, at_step
 from usm_gym.robot import Robot
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import named
 
-AXES = ("x", "y")
 Records = dict[tuple[str, Any], Record]
 
 # Figure: (caption, row, mode).
@@ -131,12 +130,13 @@ def _signals(record: Record, row: str) -> Any:
 def _errors(record: Record, row: str) -> Any:
     from matplotlib import pyplot as plt
 
-    figure, panels = plt.subplots(2, 1, figsize=(8, 5), sharex=True, layout="constrained")
+    size = 8, 2.5 * len(AXES)
+    figure, panels = plt.subplots(len(AXES), 1, figsize=size, sharex=True, layout="constrained")
     for axis, name in enumerate(AXES):
         panels[axis].plot(record.time, 1e3 * record.error[:, axis], color=f"C{axis}")
         panels[axis].set(ylabel=f"error in {name} [mm]")
         panels[axis].grid(alpha=0.3)
-    panels[1].set(xlabel="time [s]")
+    panels[-1].set(xlabel="time [s]")
     return figure
 
 

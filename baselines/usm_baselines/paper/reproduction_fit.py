@@ -8,37 +8,41 @@ Candidates are scored with the implicit laws at a coarser step; the best is chec
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
-from usm_baselines.paper.paper_rate import Law, simulate
+from usm_baselines.paper.paper_rate import Law, LostRobotError
 from usm_baselines.paper.reproduction import (
     HEADING_GAIN,
     IMPLICIT_STEP,
     PAPER,
-    SAMPLE_TIME,
+    PARTS,
     STEP,
+    Case,
     at_step,
+    errors_of,
     laws,
+    run_case,
     velocity_start,
 )
-from usm_gym.support.files import read_json, write_json
-from usm_gym.support.provenance import provenance
-from usm_gym.support.validation import in_one_line
+from usm_gym.support.files import read_json
+from usm_gym.support.results import Interval, Provenance, Result
+from usm_gym.support.validation import Number, UsageError, in_one_line, validated
 from usm_gym.task.loss import LOST_ERROR
-from usm_gym.task.metrics import max_error, settled_error
 from usm_gym.task.sampling import named
 from usm_gym.task.scenario import Mode, Scenario
 
 Array = NDArray[np.float64]
 
+# The numbers of the paper that the fit sees: row and part of the table.
+SEEN = (("pd", "torpedo"), ("pd", "operation"), ("pd", "settled"), ("sta", "operation"))
 # What is free, and between what, spread evenly in the logarithm.
 FREEDOM = {
     "speed": (0.02, 0.12),  # of the path, m/s
@@ -55,6 +59,80 @@ POPULATION = 24
 # A factor of so much off the paper's number counts one.
 AIM = {"pd": 1.3, "sta": 2.0}
 Freedoms = dict[str, float]
+Numbers = dict[str, list[float]]
+
+
+@validated
+class Assessment:
+    """What a declaration makes at a step.
+
+    Attributes:
+        step: The step, s.
+        numbers: The numbers that the fit sees, by law and part, one for each axis, m.
+        residual: How far they are from the paper's.
+    """
+
+    step: Number
+    numbers: Mapping[str, tuple[Number, ...]]
+    residual: Number
+
+
+@validated
+class Candidate:
+    """A declaration and what it makes.
+
+    Attributes:
+        freedoms: Its values.
+        coarse: At the step of the search.
+        paper: At the paper's step.
+    """
+
+    freedoms: Mapping[str, Number]
+    coarse: Assessment
+    paper: Assessment
+
+
+Evaluations = tuple[tuple[tuple[Number, ...], Number], ...]
+
+
+@validated
+class FitProgress(Result):
+    """A fit that is under way.
+
+    Attributes:
+        evaluations: Every candidate so far, in the unit cube of the freedoms, with its residual.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "fit"
+    marked: ClassVar[bool] = False
+    evaluations: Evaluations
+    provenance: Provenance
+
+
+@validated
+class FitResult(Result):
+    """The fit, as `usm reproduce --fit` writes it.
+
+    Attributes:
+        freedom: What is free, and between what.
+        seen: What the paper prints, m.
+        aim: A factor of so much off the paper's number counts one, by law.
+        declared: The declaration of this project.
+        fitted: The best one.
+        evaluations: Every candidate, in the unit cube of the freedoms, with its residual.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "fit"
+    marked: ClassVar[bool] = False
+    freedom: Mapping[str, Interval]
+    seen: Mapping[str, tuple[Number, ...]]
+    aim: Mapping[str, Number]
+    declared: Candidate
+    fitted: Candidate
+    evaluations: Evaluations
+    provenance: Provenance
 
 
 def declared() -> Freedoms:
@@ -88,7 +166,7 @@ def scenario_of(freedoms: Freedoms, mode: Mode, step: float) -> Scenario:
         joint_stiffness=freedoms["joint_stiffness"],
         joint_damping=freedoms["joint_stiffness"] / freedoms["joint_corner"],
     )
-    if mode == "torpedo":
+    if scenario.look_ahead is not None:
         return replace(scenario, look_ahead=freedoms["look_ahead"])
     size = freedoms["deflection"]
     return replace(
@@ -96,15 +174,10 @@ def scenario_of(freedoms: Freedoms, mode: Mode, step: float) -> Scenario:
     )
 
 
-def numbers(freedoms: Freedoms, step: float, implicit: bool) -> dict[str, list[float]]:
-    """The numbers that the fit sees, (x, y) in m; `LOST_ERROR` where the robot is lost."""
-    found: dict[str, list[float]] = {}
-    chosen: tuple[tuple[str, Mode], ...] = (
-        ("pd", "torpedo"),
-        ("pd", "operation"),
-        ("sta", "operation"),
-    )
-    for row, mode in chosen:
+def numbers(freedoms: Freedoms, step: float, implicit: bool) -> Numbers:
+    """The numbers that the fit sees, one for each axis, m; `LOST_ERROR` where the robot is lost."""
+    errors: dict[tuple[str, Mode], Mapping[str, Mapping[str, float]] | None] = {}
+    for row, mode in dict.fromkeys((row, PARTS[part]) for row, part in SEEN):
         scenario = scenario_of(freedoms, mode, step)
         law: Law = laws(scenario)[row]._replace(implicit=implicit, start=velocity_start(scenario))
         gain = freedoms["heading_gain"]
@@ -112,39 +185,37 @@ def numbers(freedoms: Freedoms, step: float, implicit: bool) -> dict[str, list[f
             super_twisting=law.super_twisting._replace(heading_gain=gain),
             pd=law.pd._replace(heading_gain=gain),
         )
-        parts = [mode, "settled"] if (row, mode) == ("pd", "operation") else [mode]
+        case = Case(row, mode, law, scenario)
         try:
-            record = simulate(scenario, law, max(1, round(SAMPLE_TIME / step)))
-        except ValueError:
-            found |= {f"{row} {part}": [LOST_ERROR] * 2 for part in parts}
-            continue
-        time, error, settle = record.time, record.error, scenario.settle_time
-        found[f"{row} {mode}"] = max_error(time, error, settle).tolist()
-        if "settled" in parts:
-            shifts = scenario.shifts
-            found[f"{row} settled"] = settled_error(time, error, shifts, settle).tolist()
-    return found
+            errors[row, mode] = errors_of(case, run_case(case))
+        except LostRobotError:
+            errors[row, mode] = None
+    made: Numbers = {}
+    for row, part in SEEN:
+        known = errors[row, PARTS[part]]
+        axes = PAPER[row][part]
+        made[f"{row} {part}"] = [LOST_ERROR if known is None else known[part][k] for k in axes]
+    return made
 
 
-def seen() -> dict[str, list[float]]:
+def seen() -> Numbers:
     """What the paper prints for the same numbers, m."""
-    names = ("pd torpedo", "pd operation", "pd settled", "sta operation")
-    return {name: list(PAPER[name.split()[0]][name.split()[1]].values()) for name in names}
+    return {f"{row} {part}": list(PAPER[row][part].values()) for row, part in SEEN}
 
 
-def residual(found: dict[str, list[float]]) -> float:
+def residual(made: Mapping[str, Sequence[float]]) -> float:
     """Sum of squares of log(ours / the paper's) over log(aim)."""
     total = 0.0
     for name, printed in seen().items():
         unit = math.log(AIM[name.split()[0]])
-        ratio = np.log(np.divide(found[name], printed)) / unit
+        ratio = np.log(np.divide(made[name], printed)) / unit
         total += float(ratio @ ratio)
     return total
 
 
 def fit(
     path: Path, generations: int, workers: int, progress: Callable[[int, int], object]
-) -> dict[str, Any]:
+) -> FitResult:
     """Fit, keeping every evaluation in a file after every generation.
 
     The search is a function of its seed and of the scores alone, so that an interrupted fit that is
@@ -157,84 +228,104 @@ def fit(
         progress: Called with the evaluations done and those there will be.
 
     Returns:
-        What the file then holds: freedom, what was seen, and declaration, numbers and residual of
-        the declaration and of the best candidate, at the coarse step and at the paper's.
+        What the file then holds.
     """
-    low, high = np.log(list(FREEDOM.values())).T
-    origin = provenance({"fit": SEED})
-    scores = stored(path, origin)
-    start = np.random.default_rng(SEED).random((POPULATION, len(FREEDOM)))
-    start[0] = (np.log(list(declared().values())) - low) / (high - low)
-    planned = POPULATION * (generations + 1)
-    done = 0
-
-    def freedoms_of(x: Array) -> Freedoms:
-        values = np.exp(low + x * (high - low)).tolist()
-        return dict(zip(FREEDOM, values, strict=True))
-
-    def score(x: Array) -> float:
-        return residual(numbers(freedoms_of(x), IMPLICIT_STEP, implicit=True))
-
-    def generation(_: object, candidates: Iterable[Array]) -> list[float]:
-        nonlocal done
-        chosen = [np.asarray(x) for x in candidates]
-        fresh = [x for x in chosen if tuple(x) not in scores]
-        for x, each in zip(fresh, pool.map(score, fresh), strict=True):
-            scores[tuple(x)] = each
-        if fresh:
-            write_json(path, {"evaluations": listed(scores), "provenance": origin})
-        done += len(chosen)
-        progress(done, planned)
-        return [scores[tuple(x)] for x in chosen]
-
-    with ThreadPoolExecutor(workers) as pool:
-        best = differential_evolution(
-            score,
-            Bounds(np.zeros(len(FREEDOM)), np.ones(len(FREEDOM))),
-            init=start,
-            maxiter=generations,
-            tol=0.0,
-            rng=SEED,
-            updating="deferred",
-            polish=False,
-            workers=generation,
-        )
-    document = {
-        "freedom": {name: list(bounds) for name, bounds in FREEDOM.items()},
-        "seen": seen(),
-        "aim": AIM,
-        "declared": assessed(declared()),
-        "fitted": assessed(freedoms_of(best.x)),
-        "evaluations": listed(scores),
-        "provenance": origin,
-    }
-    write_json(path, document)
-    return document
-
-
-def assessed(freedoms: Freedoms) -> dict[str, Any]:
-    """Freedoms with their numbers and residual at both steps."""
-    result: dict[str, Any] = {"freedoms": freedoms}
-    for name, step, implicit in (("coarse", IMPLICIT_STEP, True), ("paper", STEP, False)):
-        found = numbers(freedoms, step, implicit)
-        result[name] = {"step": step, "numbers": found, "residual": residual(found)}
+    search = Search(path, workers, lambda done: progress(done, POPULATION * (generations + 1)))
+    best = search.best(generations)
+    result = FitResult(
+        freedom=FREEDOM,
+        seen={name: tuple(values) for name, values in seen().items()},
+        aim=AIM,
+        declared=assessed(declared()),
+        fitted=assessed(best),
+        evaluations=search.evaluations,
+        provenance=search.origin,
+    )
+    result.write(path)
     return result
 
 
-def stored(path: Path, origin: dict[str, Any]) -> dict[tuple[float, ...], float]:
+class Search:
+    """A differential evolution that keeps its evaluations in a file.
+
+    Attributes:
+        origin: Where the evaluations come from.
+    """
+
+    def __init__(self, path: Path, workers: int, progress: Callable[[int], object]) -> None:
+        """Take up what the file holds; `progress` is called with the evaluations done."""
+        self.origin = Provenance.here({"fit": SEED})
+        self._low, self._high = np.log(list(FREEDOM.values())).T
+        self._path, self._workers, self._progress = path, workers, progress
+        self._scores = stored(path, self.origin)
+        self._done = 0
+
+    @property
+    def evaluations(self) -> Evaluations:
+        """Every candidate with its residual."""
+        return tuple((tuple(map(float, x)), score) for x, score in self._scores.items())
+
+    def best(self, generations: int) -> Freedoms:
+        """The best candidate after some generations."""
+        start = np.random.default_rng(SEED).random((POPULATION, len(FREEDOM)))
+        width = self._high - self._low
+        start[0] = (np.log(list(declared().values())) - self._low) / width
+        with ThreadPoolExecutor(self._workers) as pool:
+
+            def generation(_: object, candidates: Iterable[Array]) -> list[float]:
+                return self._scored(pool, [np.asarray(x) for x in candidates])
+
+            best = differential_evolution(
+                self._score,
+                Bounds(np.zeros(len(FREEDOM)), np.ones(len(FREEDOM))),
+                init=start,
+                maxiter=generations,
+                tol=0.0,
+                rng=SEED,
+                updating="deferred",
+                polish=False,
+                workers=generation,
+            )
+        return self._freedoms(best.x)
+
+    def _scored(self, pool: ThreadPoolExecutor, candidates: list[Array]) -> list[float]:
+        """The residuals of a generation; the file then holds them, too."""
+        fresh = [x for x in candidates if tuple(x) not in self._scores]
+        for x, each in zip(fresh, pool.map(self._score, fresh), strict=True):
+            self._scores[tuple(x)] = each
+        if fresh:
+            FitProgress(evaluations=self.evaluations, provenance=self.origin).write(self._path)
+        self._done += len(candidates)
+        self._progress(self._done)
+        return [self._scores[tuple(x)] for x in candidates]
+
+    def _score(self, x: Array) -> float:
+        return residual(numbers(self._freedoms(x), IMPLICIT_STEP, implicit=True))
+
+    def _freedoms(self, x: Array) -> Freedoms:
+        values = np.exp(self._low + x * (self._high - self._low)).tolist()
+        return dict(zip(FREEDOM, values, strict=True))
+
+
+def assessed(freedoms: Freedoms) -> Candidate:
+    """Freedoms with their numbers and residual at both steps."""
+
+    def at(step: float, implicit: bool) -> Assessment:
+        made = numbers(freedoms, step, implicit)
+        kept = {name: tuple(values) for name, values in made.items()}
+        return Assessment(step=step, numbers=kept, residual=residual(made))
+
+    return Candidate(freedoms=freedoms, coarse=at(IMPLICIT_STEP, True), paper=at(STEP, False))
+
+
+def stored(path: Path, origin: Provenance) -> dict[tuple[float, ...], float]:
     """Scores of this commit in the file, by candidate."""
+    if not path.exists():
+        return {}
     try:
         document = read_json(path)
-        if document["provenance"]["commit"] != origin["commit"]:
-            return {}
-        return {tuple(x): score for x, score in document["evaluations"]}
-    except FileNotFoundError:
-        return {}
-    except (ValueError, KeyError, TypeError) as error:
-        reason = in_one_line(error)
-        raise ValueError(f"{path} is no fit: {reason}; remove it to start anew") from error
-
-
-def listed(scores: dict[tuple[float, ...], float]) -> list[Any]:
-    """Scores in JSON's types."""
-    return [[list(map(float, x)), score] for x, score in scores.items()]
+        whole = isinstance(document, dict) and "fitted" in document
+        kept = (FitResult if whole else FitProgress).parsed(document, path)
+    except UsageError as error:
+        raise UsageError(f"{in_one_line(error)}; remove it to start anew") from error
+    return {} if kept.provenance.commit != origin.commit else dict(kept.evaluations)

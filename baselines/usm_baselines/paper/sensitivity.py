@@ -3,32 +3,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from usm_baselines.laws.pd import FORCE, MASS, OBSERVER
-from usm_baselines.paper.paper_rate import Law, Record, simulate
+from usm_baselines.paper.paper_rate import Law, LostRobotError, simulate
 from usm_baselines.paper.reproduction import (
     SAMPLE_TIME,
     STEP,
     Case,
     at_step,
-    axes,
+    by_axis,
+    errors_of,
     laws,
     side_by_side,
     velocity_start,
 )
 from usm_gym.robot import Robot
-from usm_gym.support.files import read_json, write_json
-from usm_gym.support.provenance import provenance
-from usm_gym.support.validation import in_one_line
-from usm_gym.task.metrics import max_error, settled_error
+from usm_gym.support.results import Provenance, Result
+from usm_gym.support.validation import Number, Switch, UsageError, in_one_line, validated
 from usm_gym.task.sampling import named
 from usm_gym.task.scenario import MODES, Mode
+from usm_gym.task.stored_scenario import StoredScenario, as_json
 
 ROWS = ("sta", "pd")
 # Starts of the sliding variable in both axes, m/s, for the study of the oscillation that remains.
@@ -55,9 +56,8 @@ class Variation:
     Attributes:
         conditions: Fields of the conditions.
         scenario: Fields of the scenario.
-        inspection: Fields of the joint motion, and with `joints` what else is changed in operation
-            mode alone, where joints move.
-        joints: Fields of the scenario, in operation mode alone.
+        inspection: Fields of the joint motion, where joints move.
+        joints: Fields of the scenario, where joints move.
         law: Fields of both laws.
         super_twisting: Gains of the STA.
         pd_reading: Reading of the PD controller.
@@ -77,7 +77,7 @@ class Variation:
 
 
 @dataclass(frozen=True)
-class Run:
+class Trial:
     """One run of the study.
 
     Attributes:
@@ -89,6 +89,92 @@ class Run:
     item: str
     value: str
     case: Case
+
+
+@validated
+class LawRecord:
+    """A control law as files hold it.
+
+    Attributes:
+        reading: Reading of the PD controller; -1 for the STA.
+        measured: Whether the velocity is measured.
+        implicit: Whether the law is discretised implicitly.
+        start: Estimate of the velocity at the start, m/s.
+        gains: Gains by name.
+    """
+
+    reading: int
+    measured: Switch
+    implicit: Switch
+    start: tuple[Number, ...]
+    gains: Mapping[str, Number]
+
+
+@validated
+class Outcome:
+    """What is kept of a run in which the robot was not lost.
+
+    Attributes:
+        errors: Largest errors by part of the table and axis, m.
+        thrust_effort: Mean thrust after settling, N.
+        peak_force: Largest force on the centre of mass after settling, N.
+        sigma: Largest |sigma| in the "first" and in the "last" second, by axis, m/s.
+    """
+
+    errors: Mapping[str, Mapping[str, Number]]
+    thrust_effort: Number
+    peak_force: Number
+    sigma: Mapping[str, Mapping[str, Number]]
+
+
+@validated
+class TrialResult:
+    """A run with its outcome.
+
+    Attributes:
+        item: The open item.
+        value: What is put in its place.
+        row: The law, "sta" or "pd".
+        mode: "operation" or "torpedo".
+        scenario: The scenario.
+        law: The law with all that is changed.
+        result: The outcome; None where the robot was lost.
+    """
+
+    item: str
+    value: str
+    row: str
+    mode: str
+    scenario: StoredScenario
+    law: LawRecord
+    result: Outcome | None
+
+    @property
+    def key(self) -> str:
+        """What the outcome depends on: equal keys, equal outcomes."""
+        law = TypeAdapter(LawRecord).dump_python(self.law, mode="json")
+        return json.dumps([as_json(self.scenario), law], sort_keys=True)
+
+
+@validated
+class SensitivityResult(Result):
+    """The study of the open items, as `usm reproduce --study` writes it.
+
+    Attributes:
+        runs: The runs that are done.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "study of the open items"
+    marked: ClassVar[bool] = False
+    runs: tuple[TrialResult, ...]
+    provenance: Provenance
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of the errors; none if every robot was lost."""
+        outcomes = [run.result for run in self.runs if run.result is not None]
+        return tuple(next(iter(outcomes[0].errors.values()))) if outcomes else ()
 
 
 def variations() -> dict[str, dict[str, Variation]]:
@@ -160,7 +246,7 @@ def case_of(variation: Variation, row: str, mode: Mode) -> Case:
     scenario = at_step(named("table1", mode), STEP)
     conditions = replace(scenario.conditions, **variation.conditions)
     scenario = replace(scenario, conditions=conditions, **variation.scenario)
-    if mode == "operation":
+    if scenario.shifts:
         inspection = replace(scenario.inspection, **variation.inspection)
         scenario = replace(scenario, inspection=inspection, **variation.joints)
     law: Law = laws(scenario)[row]
@@ -178,10 +264,10 @@ def case_of(variation: Variation, row: str, mode: Mode) -> Case:
     )
 
 
-def runs() -> list[Run]:
+def trials() -> list[Trial]:
     """All runs of the study."""
-    found = [
-        Run(item, value, case_of(variation, row, mode))
+    listed = [
+        Trial(item, value, case_of(variation, row, mode))
         for item, values in variations().items()
         for value, variation in values.items()
         for row in ROWS
@@ -189,20 +275,22 @@ def runs() -> list[Run]:
     ]
     for sigma in STARTS:
         variation = Variation(sigma_start=(sigma, sigma))
-        found.append(Run("oscillation", f"{sigma:g}", case_of(variation, "sta", "torpedo")))
+        listed.append(Trial("oscillation", f"{sigma:g}", case_of(variation, "sta", "torpedo")))
     for period in PERIODS:
         for name, conditions in SENSORS_AND_THRUSTERS.items():
             for implicit in (False, True):
                 timing = {"control_period": period, "physics_step": min(period, LONGEST_STEP)}
                 variation = Variation(conditions=timing | conditions, law={"implicit": implicit})
                 value = f"{'implicit' if implicit else 'explicit'}, {name}, {period:g}"
-                found += [Run("rate", value, case_of(variation, row, "operation")) for row in ROWS]
-    return found
+                listed += [
+                    Trial("rate", value, case_of(variation, row, "operation")) for row in ROWS
+                ]
+    return listed
 
 
 def study(
-    path: Path, workers: int, progress: Callable[[int, int], object], chosen: Sequence[Run]
-) -> list[dict[str, Any]]:
+    path: Path, workers: int, progress: Callable[[int, int], object], chosen: Sequence[Trial]
+) -> SensitivityResult:
     """Run what a file does not hold yet, keeping the file up to date after every run.
 
     Args:
@@ -212,80 +300,75 @@ def study(
         chosen: The runs.
 
     Returns:
-        What the file then holds: item, value, row, mode, scenario, law and result of every run;
-        the result is None where the robot was lost.
+        What the file then holds.
     """
-    origin = provenance({})
-    entries = [described(run) for run in chosen]
+    origin = Provenance.here({})
+    planned = [planned_result(trial) for trial in chosen]
     known = stored(path, origin)
-    todo: dict[str, Case] = {}
-    for run, entry in zip(chosen, entries, strict=True):
-        if key(entry) not in known:
-            todo[key(entry)] = run.case
+    todo = {
+        each.key: trial.case
+        for trial, each in zip(chosen, planned, strict=True)
+        if each.key not in known
+    }
     total, done = sum(map(cost, todo.values())), 0
+
+    def finished() -> SensitivityResult:
+        runs = (replace(each, result=known[each.key]) for each in planned if each.key in known)
+        return SensitivityResult(runs=tuple(runs), provenance=origin)
+
     # The longest first, so that no thread is left with one at the end.
     ordered = sorted(todo, key=lambda each: -cost(todo[each]))
-    for name, result in side_by_side(outcome, {name: todo[name] for name in ordered}, workers):
-        known[name] = result
-        write_study(path, entries, known, origin)
-        done += cost(todo[name])
+    for key, result in side_by_side(outcome, {key: todo[key] for key in ordered}, workers):
+        known[key] = result
+        finished().write(path)
+        done += cost(todo[key])
         progress(done, total)
-    write_study(path, entries, known, origin)
-    return [entry | {"result": known[key(entry)]} for entry in entries]
+    whole = finished()
+    whole.write(path)
+    return whole
 
 
-def outcome(case: Case) -> dict[str, Any] | None:
+def outcome(case: Case) -> Outcome | None:
     """What a run of the study leaves; None where the robot is lost."""
     scenario = case.scenario
     every = max(1, round(SAMPLE_TIME / scenario.conditions.physics_step))
     try:
         record = simulate(scenario, case.law, every)
-    except ValueError:
+    except LostRobotError:
         return None
     late = record.time >= scenario.settle_time
-    errors: dict[str, Any] = {case.mode: max_error(record.time, record.error, scenario.settle_time)}
-    if case.mode == "operation":
-        errors["settled"] = settled_error(
-            record.time, record.error, scenario.shifts, scenario.settle_time
-        )
-    return {
-        "errors": {part: axes(each) for part, each in errors.items()},
-        "thrust_effort": float(record.effort[late].mean()),
-        "peak_force": float(np.abs(record.force[late]).max()),
-        "sigma": {part: axes(each) for part, each in sigma_amplitude(record).items()},
-    }
-
-
-def sigma_amplitude(record: Record) -> dict[str, Any]:
-    """Largest |sigma| in the first and in the last second, m/s, (2,) each."""
     size = np.abs(record.sigma)
     first, last = record.time < 1.0, record.time >= record.time[-1] - 1.0
-    return {"first": size[first].max(axis=0), "last": size[last].max(axis=0)}
-
-
-def described(run: Run) -> dict[str, Any]:
-    """A run in JSON's types."""
-    law = run.case.law
-    gains = law.pd if run.case.row == "pd" else law.super_twisting
-    return {
-        "item": run.item,
-        "value": run.value,
-        "row": run.case.row,
-        "mode": run.case.mode,
-        "scenario": run.case.scenario.to_dict(),
-        "law": {
-            "reading": law.reading,
-            "measured": law.measured,
-            "implicit": law.implicit,
-            "start": list(law.start),
-            "gains": gains._asdict(),
+    return Outcome(
+        errors=errors_of(case, record),
+        thrust_effort=float(record.effort[late].mean()),
+        peak_force=float(np.abs(record.force[late]).max()),
+        sigma={
+            "first": by_axis(size[first].max(axis=0)),
+            "last": by_axis(size[last].max(axis=0)),
         },
-    }
+    )
 
 
-def key(entry: dict[str, Any]) -> str:
-    """What a result depends on: equal keys, equal results."""
-    return json.dumps([entry["scenario"], entry["law"]], sort_keys=True)
+def planned_result(trial: Trial) -> TrialResult:
+    """A run as files hold it, without its outcome."""
+    law = trial.case.law
+    gains = law.pd if trial.case.row == "pd" else law.super_twisting
+    return TrialResult(
+        item=trial.item,
+        value=trial.value,
+        row=trial.case.row,
+        mode=trial.case.mode,
+        scenario=trial.case.scenario,
+        law=LawRecord(
+            reading=law.reading,
+            measured=law.measured,
+            implicit=law.implicit,
+            start=law.start,
+            gains=gains._asdict(),
+        ),
+        result=None,
+    )
 
 
 def cost(case: Case) -> int:
@@ -293,23 +376,16 @@ def cost(case: Case) -> int:
     return case.scenario.steps * case.scenario.conditions.substeps
 
 
-def stored(path: Path, origin: dict[str, Any]) -> dict[str, Any]:
-    """Results of this commit in the file, by key."""
-    try:
-        document = read_json(path)
-        if document["provenance"]["commit"] != origin["commit"]:
-            return {}
-        return {key(entry): entry["result"] for entry in document["runs"]}
-    except FileNotFoundError:
+def stored(path: Path, origin: Provenance) -> dict[str, Outcome | None]:
+    """Outcomes of this commit in the file, by key."""
+    if not path.exists():
         return {}
-    except (ValueError, KeyError, TypeError) as error:
-        reason = in_one_line(error)
-        raise ValueError(f"{path} is no study: {reason}; remove it to start anew") from error
-
-
-def write_study(
-    path: Path, entries: list[dict[str, Any]], known: dict[str, Any], origin: dict[str, Any]
-) -> None:
-    """Write what is known so far."""
-    finished = [entry | {"result": known[key(entry)]} for entry in entries if key(entry) in known]
-    write_json(path, {"runs": finished, "provenance": origin})
+    try:
+        kept = SensitivityResult.read(path)
+    except UsageError as error:
+        raise UsageError(f"{in_one_line(error)}; remove it to start anew") from error
+    return (
+        {}
+        if kept.provenance.commit != origin.commit
+        else {run.key: run.result for run in kept.runs}
+    )

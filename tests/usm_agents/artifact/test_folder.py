@@ -148,7 +148,7 @@ def in_bfloat16(folder):
         (lost, WEIGHTS),
         (cut_short, "is no agent"),
         (linked, "a symbolic link"),
-        (piped, "a regular file"),
+        pytest.param(piped, "a regular file", marks=pytest.mark.posix),
         (nested, "nested too deeply"),
         (in_bfloat16, "'BF16'; allowed: .* float32"),
         (lambda folder: change(folder, summary="x" * 10**6, also=1), "also"),

@@ -7,7 +7,6 @@ import pytest
 import usm_agents  # noqa: F401 (registers them)
 import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
-from usm_baselines.benchmark.leaderboard import total
 
 import usm_gym
 from usm_gym.suites import unseen
@@ -27,7 +26,7 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
         for id in (folder.name, agent.base)
     )
     assert not ours.failed.any()
-    assert total(ours).mean() < total(base).mean()
+    assert ours.total_error.mean() < base.total_error.mean()
     for axis in "xy":
         name = f"max_error_{axis}"
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]

@@ -12,11 +12,12 @@ from usm_agents.artifact.folder import read_agent
 from usm_agents.learning.plan import Plan, write_plan
 from usm_agents.learning.settings import SETTINGS
 from usm_agents.learning.training import train
-from usm_agents.study import dissection, page, plans, scores, trainings
+from usm_agents.study import dissection, plans, scores, trainings
 from usm_agents.study.dissection import lateness
 from usm_agents.study.plans import PLANS, SEEDS, TRANSFER
+from usm_agents.study.results import CurvePoint
 from usm_agents.study.scores import best_so_far, steps_to
-from usm_agents.study.trainings import runs
+from usm_agents.study.trainings import planned
 
 from usm_cli.program import main
 from usm_gym.support.files import write_json
@@ -29,8 +30,7 @@ def small(monkeypatch):
     small_train = partial(train, validation_episodes=2, test_episodes=2)
     monkeypatch.setattr(trainings, "train", small_train)
     monkeypatch.setattr(plans, "RIVALS", ("sta", "zero"))
-    for module in (scores, page):
-        monkeypatch.setattr(module, "TRANSFER", {"still": TRANSFER["still"]})
+    monkeypatch.setattr(scores, "TRANSFER", {"still": TRANSFER["still"]})
     monkeypatch.setattr(dissection, "EPISODES", 1)
 
 
@@ -114,7 +114,7 @@ class Bomb:
 
 @pytest.mark.parametrize("curve", [{}, [], 5, [{"steps": "x"}], [[]]])
 def test_a_damaged_learning_curve_is_said_to_be_one(tmp_path, curve):
-    (run,) = runs(["residual-ppo"], 1, tmp_path)
+    (run,) = planned(["residual-ppo"], 1, tmp_path)
     write_plan(run.plan, run.folder)
     write_json(run.folder / "curve.json", curve)
     with pytest.raises(ValueError, match="a learning curve"):
@@ -122,15 +122,15 @@ def test_a_damaged_learning_curve_is_said_to_be_one(tmp_path, curve):
 
 
 def test_every_seed_has_its_own_training_and_early_seeds_come_first(tmp_path):
-    found = runs(list(PLANS), 5, tmp_path)
-    assert [run.plan.seed for run in found] == sorted(run.plan.seed for run in found)
-    assert len({run.folder for run in found}) == len(found)
+    chosen = planned(list(PLANS), 5, tmp_path)
+    assert [run.plan.seed for run in chosen] == sorted(run.plan.seed for run in chosen)
+    assert len({run.folder for run in chosen}) == len(chosen)
     for name in PLANS:
-        seeds = [run.plan.seed for run in found if run.name == name]
+        seeds = [run.plan.seed for run in chosen if run.name == name]
         assert seeds == list(range(SEEDS[name]))
     assert SEEDS["residual-ppo"] > 1
     with pytest.raises(ValueError, match="--only is 'nobody'"):
-        runs(["nobody"], 1, tmp_path)
+        planned(["nobody"], 1, tmp_path)
 
 
 def test_plans_differ_from_the_reference_in_what_they_are_named_for():
@@ -150,7 +150,12 @@ def test_lateness_is_found():
 def test_steps_to_an_error_are_those_of_the_best_agents_so_far():
     def curve(*errors):
         return [
-            {"steps": 100 * k, "max_error_x": error, "max_error_y": 0.0}
+            CurvePoint(
+                steps=100 * k,
+                seconds=0.0,
+                means={"max_error_x": error, "max_error_y": 0.0},
+                failures=0,
+            )
             for k, error in enumerate(errors)
         ]
 

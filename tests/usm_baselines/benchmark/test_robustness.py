@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from usm_baselines.benchmark.robustness import QUANTITIES, tasks
+from usm_baselines.benchmark.robustness import QUANTITIES, jobs
 from usm_baselines.benchmark.scoring import Refusal, score_all, shared_nominal
 from usm_baselines.contender import contender
 
@@ -44,17 +44,17 @@ def test_the_suites_own_value_changes_nothing_and_another_one_thing(
 def test_policies_keep_the_nominal_knowledge_but_know_their_period() -> None:
     nominal = shared_nominal(Robot(), SCENARIOS)
     for name, quantity in QUANTITIES.items():
-        for task, value in zip(
-            tasks([contender("pd")], SCENARIOS, quantity, quantity.values),
+        for job, value in zip(
+            jobs([contender("pd")], SCENARIOS, quantity, quantity.values),
             quantity.values,
             strict=True,
         ):
             period = 1 / value if name == "rate" else 0.02
-            assert task.nominal == replace(nominal, control_period=pytest.approx(period))
+            assert job.nominal == replace(nominal, control_period=pytest.approx(period))
 
 
 def test_every_value_can_be_run() -> None:
     brief = [replace(each, duration=0.4, settle_time=0.2) for each in SCENARIOS]
     for quantity in QUANTITIES.values():
-        outcomes = score_all(tasks([contender("zero")], brief, quantity, quantity.values))
+        outcomes = score_all(jobs([contender("zero")], brief, quantity, quantity.values))
         assert not any(isinstance(outcome, Refusal) for outcome in outcomes)

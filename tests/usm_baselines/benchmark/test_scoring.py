@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from support.episodes import short
 from usm_baselines.benchmark import scoring
-from usm_baselines.benchmark.scoring import Refusal, Task, score_all, shared_nominal
+from usm_baselines.benchmark.scoring import Job, Refusal, score_all, shared_nominal
 from usm_baselines.contender import Contender, contender
 
 import usm_gym
@@ -80,12 +80,12 @@ class Unstable(Still):
         return action + 1e6
 
 
-def task(policy: str | Callable[[], Any] = "zero", scenarios: Any = SCENARIOS) -> Task:
+def job(policy: str | Callable[[], Any] = "zero", scenarios: Any = SCENARIOS) -> Job:
     if isinstance(policy, str):
-        found = contender(policy)
+        known = contender(policy)
     else:
-        found = Contender(policy.__name__, lambda nominal: policy())
-    return Task(found, scenarios, shared_nominal(ROBOT, scenarios), ROBOT)
+        known = Contender(policy.__name__, lambda nominal: policy())
+    return Job(known, scenarios, shared_nominal(ROBOT, scenarios), ROBOT)
 
 
 def assert_same(one: Any, other: Any) -> None:
@@ -108,8 +108,8 @@ FAULTS: dict[type[Still], str] = {
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_fault_costs_its_own_row_and_no_other(workers: int) -> None:
-    faulty = [replace(task(fault), time_limit=0.3) for fault in FAULTS]
-    first, *refused, last = score_all([task(), *faulty, task(Still)], workers)
+    faulty = [replace(job(fault), time_limit=0.3) for fault in FAULTS]
+    first, *refused, last = score_all([job(), *faulty, job(Still)], workers)
     assert_same(first, last)
     for outcome, reason in zip(refused, FAULTS.values(), strict=True):
         assert isinstance(outcome, Refusal)
@@ -118,7 +118,7 @@ def test_a_fault_costs_its_own_row_and_no_other(workers: int) -> None:
 
 
 def test_an_unstable_controller_loses_the_robot_and_is_scored() -> None:
-    (outcome,) = score_all([task(Unstable, tuple(short(2, duration=8.0)))])
+    (outcome,) = score_all([job(Unstable, tuple(short(2, duration=8.0)))])
     assert isinstance(outcome, Evaluation)
     assert outcome.failed.all()
     assert outcome.per_episode["max_error_x"].min() >= 0.5
@@ -127,12 +127,12 @@ def test_an_unstable_controller_loses_the_robot_and_is_scored() -> None:
 def test_scores_are_those_of_evaluate_however_they_are_computed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    expected = usm_gym.evaluate(contender("sta").make(task().nominal), SCENARIOS)
+    expected = usm_gym.evaluate(contender("sta").make(job().nominal), SCENARIOS)
     monkeypatch.setattr(scoring, "BATCH", 2)
     episodes: list[int] = []
     for workers in (1, 2):
-        tasks = [task("sta"), task("sta", SCENARIOS[::-1])]
-        one, turned = score_all(tasks, workers, progress=episodes.append)
+        jobs = [job("sta"), job("sta", SCENARIOS[::-1])]
+        one, turned = score_all(jobs, workers, progress=episodes.append)
         assert_same(one, expected)
         assert isinstance(turned, Evaluation)
         for name, values in turned.per_episode.items():
@@ -143,13 +143,13 @@ def test_scores_are_those_of_evaluate_however_they_are_computed(
 def test_what_is_kept_is_not_computed_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tasks = [task("sta"), task(Still), task(Raising)]
-    first = score_all(tasks[:1], cache=tmp_path)
-    score_all(tasks, cache=tmp_path)
+    jobs = [job("sta"), job(Still), job(Raising)]
+    first = score_all(jobs[:1], cache=tmp_path)
+    score_all(jobs, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 1  # neither other people's code nor a refusal
     monkeypatch.setattr(scoring, "score_batch", None)
     episodes: list[int] = []
-    (again,) = score_all(tasks[:1], cache=tmp_path, progress=episodes.append)
+    (again,) = score_all(jobs[:1], cache=tmp_path, progress=episodes.append)
     assert_same(again, first[0])
     assert episodes == [3]
 
@@ -179,29 +179,29 @@ DAMAGES: dict[str, Callable[[dict[str, Any]], str]] = {
 def test_kept_scores_that_are_damaged_are_computed_again(
     damage: Callable[[dict[str, Any]], str], tmp_path: Path
 ) -> None:
-    (whole,) = score_all([task("zero")], cache=tmp_path)
+    (whole,) = score_all([job("zero")], cache=tmp_path)
     (file,) = tmp_path.iterdir()
     text = file.read_text()
     file.write_text(damage(json.loads(text)))
     with pytest.warns(UserWarning, match=file.name) as warned:
-        (again,) = score_all([task("zero")], cache=tmp_path)
+        (again,) = score_all([job("zero")], cache=tmp_path)
     assert len(warned) == 1
     assert_same(again, whole)
     assert file.read_text() == text
 
 
 def test_a_key_tells_all_that_scores_depend_on() -> None:
-    one = task("sta")
+    one = job("sta")
     others = [
-        task("pd"),
-        task("sta", SCENARIOS[:2]),
-        task("sta", SCENARIOS[::-1]),
+        job("pd"),
+        job("sta", SCENARIOS[:2]),
+        job("sta", SCENARIOS[::-1]),
         replace(one, nominal=replace(one.nominal, position_noise=1.0)),
         replace(one, robot=replace(ROBOT, joint_damping=6.0)),
         replace(one, contender=replace(one.contender, identity="other sources")),
     ]
     assert len({each.key for each in (one, *others)}) == len(others) + 1
-    assert replace(one, time_limit=1.0).key == task("sta").key == one.key
+    assert replace(one, time_limit=1.0).key == job("sta").key == one.key
 
 
 KILLED = """
@@ -212,12 +212,12 @@ from usm_baselines.benchmark import scoring
 from usm_baselines.contender import contender
 from usm_gym import Robot
 
-tasks = []
+jobs = []
 for seed in range(8):
     scenarios = tuple(short(2, 20.0, seed))
     nominal = scoring.shared_nominal(Robot(), scenarios)
-    tasks.append(scoring.Task(contender("sta"), scenarios, nominal))
-for outcome in scoring.score_all(tasks, cache=Path(sys.argv[1])):
+    jobs.append(scoring.Job(contender("sta"), scenarios, nominal))
+for outcome in scoring.score_all(jobs, cache=Path(sys.argv[1])):
     print(outcome.per_episode["max_error_x"].tolist())
 """
 
@@ -227,6 +227,7 @@ def whole_files(folder: Path) -> list[Path]:
     return [file for file in folder.glob("*.json") if ".part" not in file.name]
 
 
+@pytest.mark.posix
 @pytest.mark.slow
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     tests = str(Path(__file__).parents[2])

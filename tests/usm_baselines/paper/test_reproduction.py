@@ -3,7 +3,8 @@
 import dataclasses
 
 import pytest
-from usm_baselines.paper.reproduction import PAPER, cases, run_cases, table
+from support.results import PROVENANCE
+from usm_baselines.paper.reproduction import PAPER, STEP, cases, reproduction, run_cases
 
 
 def test_short_runs_are_the_same_bits_side_by_side_and_alone():
@@ -24,9 +25,8 @@ def test_short_runs_are_the_same_bits_side_by_side_and_alone():
 @pytest.mark.slow
 def test_the_tables_of_the_paper_in_half_a_minute():
     """The bounds that the reproduction has to keep, from the one declared scenario."""
-    chosen = cases()
-    result = table(chosen, run_cases(chosen, 2, lambda: None))
-    rows, paper = result["rows"], PAPER
+    records = run_cases(cases(), 2, lambda: None)
+    rows, paper = reproduction(STEP, records, PROVENANCE).rows, PAPER
     for part, axes in paper["pd"].items():
         for axis, printed in axes.items():
             assert 0.5 < rows["pd"][part][axis] / printed < 2.0, (part, axis)

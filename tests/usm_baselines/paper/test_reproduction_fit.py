@@ -54,6 +54,6 @@ def test_an_interrupted_fit_goes_on_and_ends_as_one_that_was_not(tmp_path, monke
     )
     whole = fit(path, 9, 1, lambda done, total: None)
     assert evaluated > 100
-    assert evaluated + len(fresh) - 4 == len(whole["evaluations"])  # four for the assessment
+    assert evaluated + len(fresh) - 4 == len(whole.evaluations)  # four for the assessment
     assert whole == fit(tmp_path / "other.json", 9, 2, lambda done, total: None)
-    assert whole["fitted"]["coarse"]["residual"] < 0.2 * whole["declared"]["coarse"]["residual"]
+    assert whole.fitted.coarse.residual < 0.2 * whole.declared.coarse.residual

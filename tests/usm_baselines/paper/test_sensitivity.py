@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 from usm_baselines.paper import sensitivity
-from usm_baselines.paper.sensitivity import case_of, described, key, runs, study, variations
+from usm_baselines.paper.sensitivity import case_of, planned_result, study, trials, variations
 
 from usm_gym.plant import thrusters
 from usm_gym.robot import Robot
@@ -17,7 +17,9 @@ from usm_gym.task.scenario import MODES
 def keys_of(item, value):
     variation = variations()[item][value]
     return {
-        (row, mode): key(described(sensitivity.Run(item, value, case_of(variation, row, mode))))
+        (row, mode): planned_result(
+            sensitivity.Trial(item, value, case_of(variation, row, mode))
+        ).key
         for row in sensitivity.ROWS
         for mode in MODES
     }
@@ -39,21 +41,23 @@ def test_every_variation_differs_from_the_declaration_and_from_every_other():
     assert {row for row, mode in declared if declared[row, mode] != reading[row, mode]} == {"pd"}
 
 
-def short_runs():
+def short_trials():
     chosen = [
-        run for run in runs() if (run.item, run.value) in (("as declared", ""), ("PD", "in (19)"))
+        trial
+        for trial in trials()
+        if (trial.item, trial.value) in (("as declared", ""), ("PD", "in (19)"))
     ]
     return [
         dataclasses.replace(
-            run,
+            trial,
             case=dataclasses.replace(
-                run.case,
+                trial.case,
                 scenario=dataclasses.replace(
-                    run.case.scenario, duration=0.05 * (i + 1), settle_time=0.01
+                    trial.case.scenario, duration=0.05 * (i + 1), settle_time=0.01
                 ),
             ),
         )
-        for i, run in enumerate(chosen)
+        for i, trial in enumerate(chosen)
     ]
 
 
@@ -66,21 +70,23 @@ def test_an_interrupted_study_goes_on_and_ends_as_one_that_was_not(tmp_path):
 
     path = tmp_path / "study.json"
     with pytest.raises(KeyboardInterrupt):
-        study(path, 1, interrupt, short_runs())
+        study(path, 1, interrupt, short_trials())
     stopped = json.loads(path.read_text())["runs"]
-    assert 0 < len(stopped) < len(short_runs())
-    whole = study(path, 2, lambda done, total: calls.append((done, total)), short_runs())
+    assert 0 < len(stopped) < len(short_trials())
+    whole = study(path, 2, lambda done, total: calls.append((done, total)), short_trials())
     assert calls[0][1] > calls[-1][1]  # there was less to do
-    assert whole == study(tmp_path / "other.json", 2, lambda done, total: None, short_runs())
-    assert json.loads(path.read_text())["runs"] == whole
-    assert all(run["result"]["peak_force"] > 0 for run in whole)
+    assert whole == study(tmp_path / "other.json", 2, lambda done, total: None, short_trials())
+    assert sensitivity.SensitivityResult.read(path) == whole
+    assert all(run.result.peak_force > 0 for run in whole.runs)
 
 
 def test_a_file_that_is_no_study_is_refused(tmp_path):
     path = tmp_path / "study.json"
     path.write_text("{}")
-    with pytest.raises(ValueError, match="no study"):
-        study(path, 1, lambda done, total: None, short_runs())
+    with pytest.raises(
+        ValueError, match=r"no complete study of the open items: runs is missing.*; remove it"
+    ):
+        study(path, 1, lambda done, total: None, short_trials())
 
 
 @numba.njit

@@ -147,6 +147,34 @@ def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     assert run(OWN, **environment) == ["1 8.0"]
 
 
+SHARED = """
+import my_laws.law, my_laws.gains
+gains = my_laws.gains.Gains(a=5.0, inner=my_laws.gains.Inner(x=1.0, y=0.0), b=3.0)
+print(my_laws.law.difference(gains))
+"""
+
+
+@pytest.mark.parametrize(("old", "new"), [("a, inner, b", "b, inner, a"), ("x, y", "y, x")])
+def test_fields_that_change_places_are_noticed_by_kernels_that_do_not_import_them(
+    old, new, tmp_path
+):
+    folder = tmp_path / "my_laws"
+    folder.mkdir()
+    gains = "from collections import namedtuple\n"
+    gains += 'Gains = namedtuple("Gains", "a, inner, b")\nInner = namedtuple("Inner", "x, y")\n'
+    (folder / "__init__.py").touch()
+    (folder / "gains.py").write_text(gains)
+    (folder / "law.py").write_text(
+        "from usm_gym.kernels.compile import compiled\n\n\n"
+        "@compiled\ndef difference(gains):\n"
+        "    return gains.a - gains.b + 10.0 * gains.inner.x\n"
+    )
+    environment = {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
+    assert run(SHARED, **environment) == ["12.0"]
+    edit(folder / "gains.py", f'"{old}"', f'"{new}"')
+    assert run(SHARED, **environment) == ["12.0"]
+
+
 @pytest.mark.slow
 def test_a_processor_without_vector_or_fused_instructions_computes_the_same_bits(tmp_path):
     generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": tmp_path}

@@ -17,6 +17,7 @@ from usm_gym.support.files import (
 )
 
 
+@pytest.mark.posix
 def test_a_pipe_or_a_device_is_refused_at_once(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -35,6 +36,7 @@ def test_a_link_is_refused_where_none_is_allowed(tmp_path):
         read_json(link, links=False)
 
 
+@pytest.mark.posix
 def test_a_pipe_or_a_device_is_not_replaced(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -123,6 +125,7 @@ with holding(sys.argv[1]):
 """
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("kind", ["file", "folder"])
 def test_an_output_is_held_by_one_process_until_it_ends_however_it_ends(kind, tmp_path):
     output = tmp_path / "out"

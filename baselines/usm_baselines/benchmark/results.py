@@ -1,0 +1,227 @@
+"""Scores as files hold them, and the results of `usm evaluate` and `usm compare`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import Field, TypeAdapter
+
+from usm_gym.statistics import Comparison
+from usm_gym.support.results import Interval, Part, Provenance, Result
+from usm_gym.support.validation import Count, Number, Switch, require, validated
+from usm_gym.task.conditions import Conditions
+from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
+from usm_gym.task.stored_scenario import StoredScenarios
+
+Failures = Annotated[int, Field(strict=True, ge=0)]
+
+
+@validated
+class Summary(Part):
+    """A metric over the episodes.
+
+    Attributes:
+        mean: Mean.
+        ci95: Its 95 % interval.
+        worst: Worst episode.
+    """
+
+    mean: Number
+    ci95: Interval
+    worst: Number
+
+
+@validated
+class MiddleSummary(Summary):
+    """A metric over the episodes, also without the best and the worst quarter of them.
+
+    Attributes:
+        iqm: Mean of the middle half of the episodes.
+        iqm_ci95: Its 95 % interval.
+    """
+
+    iqm: Number
+    iqm_ci95: Interval
+
+
+@validated
+class Scores(Part):
+    """Scores of a policy over episodes.
+
+    Attributes:
+        metrics: Summary of each metric; in JSON they stand beside the other fields.
+        failures: How many episodes lost the robot.
+        per_episode: What is kept of each episode, by metric.
+    """
+
+    beside: ClassVar[str] = "metrics"
+    metrics: Mapping[str, Summary]
+    failures: Failures
+    per_episode: Mapping[str, tuple[Number | Switch, ...]]
+
+    def __post_init__(self) -> None:
+        """Refuse scores that lack what tables and pages show."""
+        require(self.axes, "metrics", list(self.metrics), f"one {MAX_ERROR}AXIS or more")
+        needed = {
+            f"{metric}_{axis}" for metric in ("max_error", "settled_error") for axis in self.axes
+        }
+        missing = {*needed, "thrust_effort", "thrust_variation"} - set(self.metrics)
+        require(not missing, "metrics", list(self.metrics), f"also {', '.join(sorted(missing))}")
+        for axis in self.axes:
+            kept = list(self.per_episode)
+            require(MAX_ERROR + axis in kept, "per_episode", kept, f"also {MAX_ERROR}{axis}")
+        counts = sorted({len(values) for values in self.per_episode.values()})
+        require(len(counts) == 1 and counts[0] > 0, "episodes", counts, "the same for each metric")
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any], **fields: Any) -> Self:
+        """The scores that `usm_gym.evaluation.Evaluation.summary` gives, and more fields."""
+        return TypeAdapter(cls).validate_python({**summary, **fields})
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of the task, in order."""
+        return axes_of(self.metrics)
+
+    @property
+    def episodes(self) -> int:
+        """How many episodes there are."""
+        return len(next(iter(self.per_episode.values())))
+
+    @property
+    def errors(self) -> dict[str, Summary]:
+        """The largest error after settling, m, by axis."""
+        return self.by_axis("max_error")
+
+    @property
+    def total(self) -> float:
+        """What policies are ranked by: the mean errors of all axes, added up, m."""
+        return float(total_error({name: each.mean for name, each in self.metrics.items()}))
+
+    def by_axis(self, metric: str) -> dict[str, Summary]:
+        """The summary of a metric such as "settled_error", by axis."""
+        return {axis: self.metrics[f"{metric}_{axis}"] for axis in self.axes}
+
+
+@validated
+class CompetitorScores(Scores):
+    """Scores of a policy that is a competitor or not.
+
+    Attributes:
+        competitor: False if it is told more than a vehicle knows.
+    """
+
+    competitor: Switch
+
+
+def require_alike(rows: Iterable[Scores]) -> None:
+    """Refuse rows of one table that differ in their axes or in the number of their episodes.
+
+    Raises:
+        UsageError: If they do.
+    """
+    listed = list(rows)
+    axes = list(dict.fromkeys(row.axes for row in listed))
+    require(len(axes) <= 1, "axes", axes, "the same for every policy")
+    episodes = sorted({row.episodes for row in listed})
+    require(len(episodes) <= 1, "episodes", episodes, "as many for every policy")
+
+
+def axes_in(rows: Iterable[Scores]) -> tuple[str, ...]:
+    """The axes that rows have in common; none if there is no row."""
+    return next((row.axes for row in rows), ())
+
+
+@validated
+class EvaluationResult(Result):
+    """Policies on one list of scenarios, as `usm evaluate` writes them.
+
+    Attributes:
+        suite: Name of the suite; None where the scenarios were sampled.
+        conditions: Conditions of the first scenario.
+        conditions_override: What `--conditions` said.
+        settle_time: From when on errors count in the first scenario, s.
+        episodes: How many scenarios there are.
+        scenarios: The scenarios.
+        results: Scores by the name of the policy.
+        refused: Why a policy has no scores, by its name.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "evaluation"
+    suite: str | None
+    conditions: Conditions
+    conditions_override: str | None
+    settle_time: Number
+    episodes: Count
+    scenarios: StoredScenarios
+    results: Mapping[str, CompetitorScores]
+    refused: Mapping[str, str]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        """Refuse rows that do not belong to the same scenarios."""
+        require_alike(self.results.values())
+        counts = {len(self.scenarios), *(row.episodes for row in self.results.values())}
+        require(counts == {self.episodes}, "episodes", self.episodes, f"{sorted(counts)}")
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of the task; none if every policy was refused."""
+        return axes_in(self.results.values())
+
+
+@validated
+class Difference:
+    """How a second policy differs from a first in one metric, as `usm_gym.statistics` compares.
+
+    Attributes:
+        episodes: How many.
+        first: Mean of the first policy.
+        second: Mean of the second policy.
+        difference: Mean of second - first, pair by pair.
+        difference_ci95: Its interval.
+        improvement: Probability that the second does better in an episode.
+        improvement_ci95: Its interval.
+        decided: Whether the data decide.
+        verdict: What follows, in words.
+    """
+
+    episodes: Count
+    first: Number
+    second: Number
+    difference: Number
+    difference_ci95: Interval
+    improvement: Number
+    improvement_ci95: Interval
+    decided: Switch
+    verdict: str
+
+    @classmethod
+    def of(cls, comparison: Comparison, first: str, second: str) -> Self:
+        """What is kept of the comparison of two policies, given their names."""
+        verdict = comparison.verdict(first, second)
+        return cls(**asdict(comparison), decided=comparison.decided, verdict=verdict)
+
+
+@validated
+class ComparisonResult(Result):
+    """Two policies on the same scenarios, as `usm compare` writes them.
+
+    Attributes:
+        first: Name of the first policy.
+        second: Name of the second policy.
+        episodes: How many scenarios there are.
+        comparisons: Their difference, by metric.
+        provenance: Where all this comes from.
+    """
+
+    kind: ClassVar[str] = "comparison"
+    marked: ClassVar[bool] = False
+    first: str
+    second: str
+    episodes: Count
+    comparisons: Mapping[str, Difference]
+    provenance: Provenance

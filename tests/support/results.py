@@ -1,0 +1,48 @@
+"""Results that are made up, on any axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, Summary
+
+from usm_gym.support.results import Provenance
+from usm_gym.task.scenario import Scenario
+
+PROVENANCE = Provenance(
+    version="0.1.0", commit=None, packages={"python": "3"}, seeds={}, command="usm"
+)
+
+
+def summary(mean: float) -> Summary:
+    """Return the summary of a metric."""
+    return Summary(mean=mean, ci95=(0.9 * mean, 1.1 * mean), worst=2.0 * mean)
+
+
+def scores(axes: Sequence[str], size: float, episodes: int) -> CompetitorScores:
+    """Return scores that grow from axis to axis."""
+    errors = {axis: size * (k + 1) for k, axis in enumerate(axes)}
+    metrics = {f"max_error_{axis}": summary(error) for axis, error in errors.items()}
+    metrics |= {f"settled_error_{axis}": summary(0.5 * error) for axis, error in errors.items()}
+    metrics |= {name: summary(3.0) for name in ("thrust_effort", "thrust_variation")}
+    per_episode = {f"max_error_{axis}": (error,) * episodes for axis, error in errors.items()}
+    return CompetitorScores(metrics=metrics, failures=0, per_episode=per_episode, competitor=True)
+
+
+def evaluation(
+    axes: Sequence[str], policies: Sequence[str], scenarios: Sequence[Scenario]
+) -> EvaluationResult:
+    """Return an evaluation of policies, the first of which is the best."""
+    return EvaluationResult(
+        suite=None,
+        conditions=scenarios[0].conditions,
+        conditions_override=None,
+        settle_time=scenarios[0].settle_time,
+        episodes=len(scenarios),
+        scenarios=tuple(scenarios),
+        results={
+            name: scores(axes, 1e-3 * (k + 1), len(scenarios)) for k, name in enumerate(policies)
+        },
+        refused={},
+        provenance=PROVENANCE,
+    )
