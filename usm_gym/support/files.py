@@ -160,7 +160,7 @@ def holding(path: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # Unlinked while it is locked: whoever has opened it meanwhile sees that its name is gone.
+        # Unlinked while it is locked: a process that has opened it meanwhile sees its name gone.
         # Windows does not remove an open file.
         with suppress(PermissionError):
             file.unlink(missing_ok=True)

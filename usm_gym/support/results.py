@@ -1,4 +1,4 @@
-"""Results as files: a frozen dataclass for each kind, checked when it is read."""
+"""Results as files: a frozen dataclass per kind, checked when it is read."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Provenance:
 
 
 class Result:
-    """A result that is kept in a file of JSON; each kind of result is a validated dataclass.
+    """A result that is kept in a JSON file; every kind of result is a validated dataclass.
 
     Attributes:
         kind: What it is.
