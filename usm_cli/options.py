@@ -48,7 +48,7 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
         "--cluster",
         metavar="ADDRESS",
         help="a Ray cluster of your own to compute on (the extra `cluster`); Ray runs the code of "
-        "whoever reaches it",
+        "anyone who can reach it",
     )
 
 

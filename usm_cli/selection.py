@@ -88,7 +88,7 @@ def chosen_contenders(names: str | None) -> list[Contender]:
 
 
 def sampled(arguments: argparse.Namespace) -> bool:
-    """Whether scenarios are to be sampled."""
+    """Whether the options ask for sampled scenarios."""
     return any(value is not None for value in (arguments.seed, arguments.episodes, arguments.mode))
 
 
@@ -110,7 +110,7 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
     name = suite_name(arguments)
     if name is not None:
         scenarios = read_suite(name)
-        return [each.under(conditions) for each in scenarios] if conditions else scenarios
+        return [scenario.under(conditions) for scenario in scenarios] if conditions else scenarios
     require(
         arguments.suite is None,
         "--suite",
@@ -151,16 +151,16 @@ def read_suite(name: str) -> list[Scenario]:
 def jobs(
     contenders: Iterable[Contender], scenarios: Sequence[Scenario], time_limit: float
 ) -> list[Job]:
-    """One job for each policy, all on the same scenarios.
+    """One job per policy, all on the same scenarios.
 
     Raises:
         ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
     """
     nominal = shared_nominal(scenarios)
     listed = []
-    for each in contenders:
-        each.make(nominal)
-        listed.append(Job(each, tuple(scenarios), nominal, time_limit))
+    for policy in contenders:
+        policy.make(nominal)
+        listed.append(Job(policy, tuple(scenarios), nominal, time_limit))
     return listed
 
 

@@ -81,7 +81,7 @@ class Growth:
         links: Links of a robot.
         robots: Robots side by side.
         threads: Threads.
-        ns: Cost for each robot and step, ns.
+        ns: Cost per robot and step, ns.
     """
 
     links: Count
@@ -110,8 +110,8 @@ class SpeedResult(Part, Result):
     """The figures of `usm bench`.
 
     Attributes:
-        medians: Median of each figure; in JSON they stand beside the other fields.
-        spread: Each figure with its spread.
+        medians: Medians by figure; in JSON they stand beside the other fields.
+        spread: The figures with their spread.
         missing: Figures that need a package which is not installed.
         growth: Costs for more links, robots and threads, if they were asked for.
         machine: The machine.
@@ -143,7 +143,7 @@ def summarise(values: Any) -> Figure:
 def interleaved(
     timings: list[Timing], rounds: int, progress: Callable[[], object]
 ) -> dict[str, list[float]]:
-    """Time everything once per round, after one run each that is not counted."""
+    """Time everything once per round, after one run that is not counted."""
     for timing in timings:
         timing.run()
     times: dict[str, list[float]] = {timing.name: [] for timing in timings}

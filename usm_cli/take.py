@@ -21,7 +21,7 @@ class Take:
 
     Attributes:
         name: The policy's.
-        pictures: One for each frame, or fewer if the robot was lost, the last then showing that.
+        pictures: One per frame, or fewer if the robot was lost, the last then showing that.
         trajectory: The episode.
     """
 

@@ -27,9 +27,9 @@ from usm_gym.support.text import figures
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Measure speed on this machine, each figure against its peer in the same run: they take turns, round
+Measure speed on this machine, every figure against its peer in the same run: they take turns, round
 by round, and medians with smallest and largest value are printed. Peers that are not
-installed (the extra `bench`) are said to be missing. Takes two minutes; let the machine do nothing
+installed (the extra `bench`) are reported as missing. Takes two minutes; let the machine do nothing
 else meanwhile.
 """
 
@@ -168,6 +168,6 @@ def growth_table(rows: list[Growth]) -> Table:
     headings = ("links", "robots", "threads", "ns per robot and step", "ns per link")
     table = empty_table(numbers=headings)
     for row in rows:
-        counts = [str(each) for each in (row.links, row.robots, row.threads)]
+        counts = [str(count) for count in (row.links, row.robots, row.threads)]
         table.add_row(*counts, figures(row.ns), figures(row.ns / row.links))
     return table

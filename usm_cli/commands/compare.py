@@ -54,7 +54,7 @@ class PolicyScores:
 
     Attributes:
         scenarios: The file's scenarios.
-        scores: The largest errors of each episode, by metric.
+        scores: The largest errors of the episodes, by metric.
     """
 
     scenarios: list[Scenario | OtherScenario]
@@ -87,14 +87,14 @@ def run(arguments: argparse.Namespace) -> None:
     missing = [named(name) for name in names if name not in files]
     scenarios: Sequence[Scenario | OtherScenario]
     scenarios = common_scenarios(arguments, names, files) if files else chosen_scenarios(arguments)
-    planar = [each for each in scenarios if isinstance(each, Scenario)]
+    planar = [scenario for scenario in scenarios if isinstance(scenario, Scenario)]
     known = not missing or len(planar) == len(scenarios)
     require(known, "policies", names, "two results, as these scenarios are of another world")
     chosen = jobs(missing, planar, arguments.time_limit) if missing else []
-    scores = {name: each.scores for name, each in files.items()}
+    scores = {name: file.scores for name, file in files.items()}
     evaluated, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
-    scores |= {name: errors_of(each.per_episode) for name, each in evaluated.items()}
+    scores |= {name: errors_of(score.per_episode) for name, score in evaluated.items()}
     first, second = (scores[name] for name in names)
     require(list(first) == list(second), "B", names[1], "a policy on the axes of A")
     compared = {name: compare(first[name], second[name]) for name in first}
@@ -102,7 +102,9 @@ def run(arguments: argparse.Namespace) -> None:
         first=names[0],
         second=names[1],
         episodes=len(scenarios),
-        comparisons={name: Difference.of(each, *names) for name, each in compared.items()},
+        comparisons={
+            name: Difference.of(comparison, *names) for name, comparison in compared.items()
+        },
         provenance=Provenance.here({"files": list(files)} if files else seeds(arguments)),
     )
     console = output_console()
@@ -120,7 +122,7 @@ def common_scenarios(
     options = ("suite", "seed", "episodes", "mode", "conditions")
     given = [f"--{name}" for name in options if getattr(arguments, name) is not None]
     require(not given, " ".join(given), names, "policies only: a file has its own scenarios")
-    scenarios, *others = [each.scenarios for each in files.values()]
+    scenarios, *others = [file.scenarios for file in files.values()]
     require(all(other == scenarios for other in others), "B", names[1], "the scenarios of A")
     return scenarios
 
@@ -143,7 +145,7 @@ def read_results(name: str) -> PolicyScores:
 
 
 def errors_of(per_episode: Mapping[str, Any]) -> Scores:
-    """The largest error of each episode in each axis, by metric."""
+    """The largest errors of the episodes, by metric."""
     return {MAX_ERROR + axis: per_episode[MAX_ERROR + axis] for axis in axes_of(per_episode)}
 
 

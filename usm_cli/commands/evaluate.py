@@ -78,8 +78,8 @@ def run(arguments: argparse.Namespace) -> None:
         episodes=len(scenarios),
         scenarios=tuple(scenarios),
         results={
-            name: CompetitorScores.of(each.summary(), competitor=name not in privileged)
-            for name, each in scores.items()
+            name: CompetitorScores.of(score.summary(), competitor=name not in privileged)
+            for name, score in scores.items()
         },
         refused=refused,
         provenance=Provenance.here(seeds(arguments)),
@@ -104,7 +104,7 @@ def table(result: EvaluationResult) -> Table:
     for name, row in result.results.items():
         errors, settled = row.errors.values(), row.by_axis("settled_error").values()
         cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
-        cells += [mm(each.worst) for each in errors] + [mm(each.mean) for each in settled]
+        cells += [mm(e.worst) for e in errors] + [mm(e.mean) for e in settled]
         cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
         rows.add_row(name, *cells, str(row.failures))
     return rows

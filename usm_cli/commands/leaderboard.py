@@ -29,7 +29,7 @@ from usm_gym.support.validation import require
 DESCRIPTION = """\
 Score every policy on every frozen suite, and on the operation suite with the joints still. Writes
 leaderboard.json, leaderboard.csv, leaderboard.md and three figures (extra `render`) into a folder.
-An interrupted run goes on where it stopped: each policy's scores on a suite are kept in the folder
+An interrupted run resumes when started again: a policy's scores on a suite are kept in the folder
 `cache` there, for as long as nothing that they depend on changes.
 """
 EXAMPLES = f"""\

@@ -1,4 +1,4 @@
-"""`usm reproduce`: the paper's Table 1 and figures, and what hangs on its open items."""
+"""`usm reproduce`: the paper's Table 1 and figures, and what depends on its open items."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def run_fit(folder: Path) -> None:
 
 
 def workers() -> int:
-    """One thread for each core."""
+    """One thread per core."""
     return os.cpu_count() or 1
 
 
@@ -159,7 +159,7 @@ def check_step(step: float) -> None:
 
 
 def columns(result: ReproductionResult) -> list[tuple[str, str]]:
-    """The columns of the table: a part and an axis each."""
+    """The columns of the table: every part with every axis."""
     return [(part, axis) for part in PARTS for axis in result.axes]
 
 
@@ -199,11 +199,11 @@ def fit_table(result: FitResult) -> Table:
     candidates = (result.declared, result.fitted)
     for part, printed in result.seen.items():
         for index, axis in enumerate(AXES):
-            made = [each.paper.numbers[part][index] for each in candidates]
-            shown.add_row(f"{part} {axis}", *(figures(each / printed[index]) for each in made))
-    shown.add_row("residual", *(figures(each.paper.residual) for each in candidates))
+            made = [candidate.paper.numbers[part][index] for candidate in candidates]
+            shown.add_row(f"{part} {axis}", *(figures(error / printed[index]) for error in made))
+    shown.add_row("residual", *(figures(candidate.paper.residual) for candidate in candidates))
     for freedom in result.freedom:
-        shown.add_row(freedom, *(figures(each.freedoms[freedom]) for each in candidates))
+        shown.add_row(freedom, *(figures(candidate.freedoms[freedom]) for candidate in candidates))
     return shown
 
 

@@ -33,14 +33,13 @@ from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Vary one quantity of a suite, all else being equal, and score policies at each value of it. They
-keep the nominal knowledge of the suite; only the control period is known to them whatever it is.
-Writes QUANTITY.json and QUANTITY.png (extra `render`) into a folder; an interrupted run goes on
-where it stopped.
+Vary one quantity of a suite, all else being equal, and score policies at every value of it. They
+keep the nominal knowledge of the suite, but always know the control period. Writes QUANTITY.json
+and QUANTITY.png (extra `render`) into a folder; an interrupted run resumes when started again.
 """
 EXAMPLES = f"""\
 quantities:
-{"".join(f"  {name:<12}{each.label}{chr(10)}" for name, each in QUANTITIES.items())}
+{"".join(f"  {name:<12}{quantity.label}{chr(10)}" for name, quantity in QUANTITIES.items())}
 {POLICIES}
 examples:
   usm robustness --vary noise --policies sta,pd
@@ -81,7 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
         label=quantity.label,
         values=values,
         scenarios=tuple(scenarios),
-        results=robustness.curves([each.name for each in contenders], values, outcomes),
+        results=robustness.curves([policy.name for policy in contenders], values, outcomes),
         provenance=Provenance.here(seeds(arguments)),
     )
     result.write(folder / f"{arguments.vary}.json")
@@ -94,7 +93,7 @@ def run(arguments: argparse.Namespace) -> None:
 def parse_values(text: str) -> tuple[float, ...]:
     """Numbers, by commas."""
     try:
-        values = tuple(float(each) for each in text.split(","))
+        values = tuple(float(value) for value in text.split(","))
     except ValueError:
         values = ()
     require(values, "--values", text, "numbers, by commas")
@@ -102,7 +101,7 @@ def parse_values(text: str) -> tuple[float, ...]:
 
 
 def table(result: RobustnessResult) -> Table:
-    """Mean errors in mm, a row for each policy."""
+    """Mean errors in mm, one row per policy."""
     axes = " / ".join(result.axes)
     rows = empty_table(
         "policy",

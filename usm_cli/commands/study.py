@@ -18,10 +18,10 @@ DESCRIPTION = """\
 Train the agents that are shipped, and others that lack one thing each, under several seeds; score
 them and the classical policies on unseen scenarios, at home and elsewhere; and look at what the
 agents do to their bases. Writes study.json, study.md and figures (extra `render`) into a folder,
-and each training into a folder of its own in `runs` there. An interrupted study goes on where it
-stopped, also within a training: its checkpoint, which is code, is run if its plan is that of the
-study, so give --output a folder of your own. A folder that holds another training, or parts of one
-without its plan, is refused. Takes hours on two cores. Needs the extra `agents`.
+and each training into a folder of its own in `runs` there. An interrupted study resumes when
+started again, even in the middle of a training: its checkpoint, which is code, is run if its plan
+is that of the study, so give --output a folder of your own. A folder that holds another training,
+or parts of one without its plan, is refused. Takes hours on two cores. Needs the extra `agents`.
 """
 EXAMPLES = """\
 examples:
@@ -42,15 +42,15 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     add("subject", choices=["residual"], help="what is studied")
     add("--only", metavar="A,B", help="some agents and ablations, by name (default: all)")
-    add("--seeds", type=int, default=5, metavar="N", help="seeds of each, at most")
-    add("--steps", type=int, metavar="N", help="steps of each training (default: each its own)")
+    add("--seeds", type=int, default=5, metavar="N", help="seeds per agent, at most (default: 5)")
+    add("--steps", type=int, metavar="N", help="steps per training (default: its own)")
     add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
     add_computing(parser)
     add("--output", default="results/study", metavar="DIR", help="default: results/study")
     add(
         "--ship",
         metavar="DIR",
-        help="put each agent, as its seed 0, into a folder of its own there",
+        help="put every agent, as its seed 0, into a folder of its own there",
     )
     parser.set_defaults(run=run)
 

@@ -16,16 +16,16 @@ DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
 --policies takes, its learning curve on held-out scenarios of the training distribution, logs for
 TensorBoard, and the last checkpoint. Frozen suites are never seen. `usm train --resume --output
-DIR` goes on from the last checkpoint, and ends as if it had never been interrupted. A checkpoint is
-code, and to resume is to run it: do so only where you trained yourself. Without --resume a folder
-that holds anything of a training is refused, and nothing in it is opened. Needs the extra `agents`.
+DIR` continues from the last checkpoint, and ends as if it had never been interrupted. A checkpoint
+is code, and resuming runs it: do so only where you trained yourself. Without --resume a folder that
+holds any file of a training is refused, and nothing in it is opened. Needs the extra `agents`.
 """
 EXAMPLES = """\
 examples:
   usm train --output mine                             PPO on the paper's controller
   usm train --algorithm tqc --base pd --output mine   another algorithm on another base
   usm train --resume --output mine                    go on after an interruption
-  usm evaluate --policies sta,mine                    what it has gained
+  usm evaluate --policies sta,mine                    what training gains
 """
 # Options that make the plan, by the names of its fields.
 OPTIONS = (

@@ -20,16 +20,15 @@ from usm_gym.task.scenario import MODES
 DESCRIPTION = """\
 Look for the gains of a policy with the smallest objective: the mean of the largest errors of all
 axes, added up, in mm, plus a weight times the thrust variation. Scenarios are sampled for tuning
-alone: no frozen suite is ever seen. An interrupted tuning goes on where it stopped when the same
-command is given again, and its result is the same for any number of workers. Needs the extra
-`tune`.
+alone: no frozen suite is ever seen. An interrupted tuning resumes when the same command is given
+again, and its result is the same for any number of workers. Needs the extra `tune`.
 """
 EXAMPLES = """\
 examples:
   usm tune sta                                      writes sta.json, trials in sta.db
   usm tune sta --trials 50 --workers 2              a quick look
   usm tune sta --weight 0.01 --output calm.json     less chattering for more error
-  usm evaluate --policies sta,sta@sta.json          what it has gained
+  usm evaluate --policies sta,sta@sta.json          what tuning gains
 """
 
 
@@ -44,7 +43,7 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     add("policy", metavar="POLICY", help="id of a policy that declares a space of gains")
     add("--trials", type=int, metavar="N", help="sets of gains to try (default: 300)")
-    add("--episodes", type=int, metavar="N", help="scenarios for each (default: 50)")
+    add("--episodes", type=int, metavar="N", help="scenarios per set (default: 50)")
     add("--weight", type=float, metavar="W", help="mm per N/s of variation (default: 0.002)")
     add("--mode", choices=MODES, default="operation", help="default: operation")
     add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
@@ -88,7 +87,7 @@ def run(arguments: argparse.Namespace) -> None:
             "weight": problem.weight,
             "mode": problem.mode,
             "conditions": asdict(problem.conditions),
-            "space": {name: asdict(each) for name, each in problem.space.items()},
+            "space": {name: asdict(span) for name, span in problem.space.items()},
             "provenance": provenance({"seed": problem.seed}),
         }
         write_json(output, document)

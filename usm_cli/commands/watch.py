@@ -81,8 +81,8 @@ def run(arguments: argparse.Namespace) -> None:
     with progress_bar() as bar:
         line = bar.add_task("simulate", total=len(contenders))
         takes = [
-            take(each, scenario, shown, lambda episodes: bar.advance(line, episodes))
-            for each in contenders
+            take(policy, scenario, shown, lambda episodes: bar.advance(line, episodes))
+            for policy in contenders
         ]
         made = film.Film(takes, len(shown), film.WIDTHS[medium][len(takes) - 1])
         if path:
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
             film.write(made, path, fps, lambda frames: bar.advance(line, frames))
     if not path:
         film.play(made, fps)
-    output_console().print(table({each.name: each.trajectory for each in takes}))
+    output_console().print(table({shot.name: shot.trajectory for shot in takes}))
 
 
 def table(trajectories: dict[str, Trajectory]) -> Table:

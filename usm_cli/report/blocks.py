@@ -1,4 +1,4 @@
-"""What a page is made of, as plain data; a template for each draws it."""
+"""What a page is made of, as plain data, drawn by one template per kind of block."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Tables:
 
     Attributes:
         title: Heading.
-        lead: What is to be seen, in a sentence or two.
+        lead: What there is to see, in a sentence or two.
         label: What they differ in.
         tables: The tables by name.
     """
@@ -91,9 +91,9 @@ class Plot:
 
     Attributes:
         title: Heading.
-        lead: What is to be seen.
+        lead: What there is to see.
         data: What `plots.js` draws: `kind` ("points" or "curves"), `x` (`label`, `log`), `y`
-            (`log`), and `panels`, each with `label` and `points`, `lines` or `series`.
+            (`log`), and `panels`, which have `label` and `points`, `lines` or `series`.
     """
 
     template: ClassVar[str] = "plot.html"
@@ -111,7 +111,7 @@ class Replay:
         lead: The scenario in words.
         data: What `replay.js` plays (`usm_cli.report.replay`).
         first: The two policies that are shown at first.
-        notes: What is to be known about the replay.
+        notes: What to know about the replay.
     """
 
     template: ClassVar[str] = "replay.html"

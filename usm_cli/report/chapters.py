@@ -1,4 +1,4 @@
-"""What each kind of result shows."""
+"""What the kinds of results show."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def read(path: Path) -> Result:
     """
     document = read_json(path)
     kind = document.get("kind") if isinstance(document, dict) else None
-    known = {each.kind: each for each in CHAPTERS}
+    known = {result_type.kind: result_type for result_type in CHAPTERS}
     require(isinstance(kind, str) and kind in known, f"kind of {path}", kind, ", ".join(known))
     return known[str(kind)].parsed(document, path)
 
@@ -125,8 +125,8 @@ def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -
     rows = result.main
     episodes = len(scenarios[MAIN])
     tables = {
-        name: score_table(each, result.refused.get(name, {}))
-        for name, each in result.suites.items()
+        name: score_table(standings, result.refused.get(name, {}))
+        for name, standings in result.suites.items()
     }
     known = {name: scenarios[name] for name in result.suites if name in scenarios}
     return Chapter(
@@ -177,7 +177,7 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
     rows, paper, step = result.rows, result.paper, result.step
     require(choice.policies is None, "--policies", "given", "none: a reproduction has its own laws")
     require(choice.scenario == 0, "--scenario", choice.scenario, "0: a reproduction has one")
-    chosen = {each.row: each for each in cases(step) if each.mode == MAIN_MODE}
+    chosen = {case.row: case for case in cases(step) if case.mode == MAIN_MODE}
     records = {}
     for name, record in side_by_side(run_case, chosen, os.cpu_count() or 1):
         records[name] = record
@@ -283,7 +283,7 @@ def conditions(
 
 def planar_only(scenarios: Sequence[Scenario | OtherScenario]) -> list[Scenario]:
     """Scenarios, if all are of the planar robot."""
-    planar = [each for each in scenarios if isinstance(each, Scenario)]
+    planar = [scenario for scenario in scenarios if isinstance(scenario, Scenario)]
     return planar if len(planar) == len(scenarios) else []
 
 
@@ -344,7 +344,7 @@ def replay(
 def episode_errors(
     rows: Mapping[str, Scores | None], names: Sequence[str], index: int
 ) -> dict[str, tuple[float, ...]]:
-    """The largest errors of an episode in each axis, m, of those policies whose scores tell."""
+    """The largest errors of an episode by axis, m, for the policies whose scores tell."""
     known = {name: row for name in names if (row := rows.get(name)) and index < row.episodes}
     return {
         name: tuple(row.per_episode[MAX_ERROR + axis][index] for axis in row.axes)
@@ -355,7 +355,7 @@ def episode_errors(
 def able(
     rows: Mapping[str, Scores | None], choice: Choice
 ) -> tuple[list[Contender], dict[str, str]]:
-    """The policies to be replayed, and why others are not.
+    """The policies to replay, and why others are not.
 
     A file of results is given nothing to open or to run: of the names in it only those of
     registered policies mean anything, unless the user gives the name, too.

@@ -78,8 +78,8 @@ def beaten(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> boo
     """Whether another point is better in one coordinate and no worse in the other."""
     here = point["x"], point["y"]
     return any(
-        each["x"] <= here[0] and each["y"] <= here[1] and (each["x"], each["y"]) != here
-        for each in points
+        other["x"] <= here[0] and other["y"] <= here[1] and (other["x"], other["y"]) != here
+        for other in points
     )
 
 
@@ -133,14 +133,14 @@ def error_curves(
     axes: Iterable[str],
     label: str,
 ) -> Plot:
-    """Errors in each axis against something."""
+    """Errors axis by axis against something."""
     panels = []
     for axis in axes:
         series = []
         for name, bands in curves.items():
             known = [band.errors.get(axis) for band in bands]
             low, mean, high = (
-                [None if each is None else 1e3 * each[k] for each in known] for k in range(3)
+                [None if error is None else 1e3 * error[k] for error in known] for k in range(3)
             )
             values = [band.value for band in bands]
             series.append({"name": name, "x": values, "y": mean, "low": low, "high": high})

@@ -41,9 +41,9 @@ class Acted:
 
     Attributes:
         data: What the page plays of it.
-        reference: Link angles of the reference posture at each picture, rad, (pictures, links).
-        current: Velocity of the water at each picture, m/s, (pictures, 2).
-        max_error: Largest error after settling in each axis, m.
+        reference: Link angles of the reference posture by picture, rad, (pictures, links).
+        current: Velocity of the water by picture, m/s, (pictures, 2).
+        max_error: Largest errors after settling by axis, m.
     """
 
     data: dict[str, Any]
@@ -58,7 +58,7 @@ class Episodes:
 
     Attributes:
         data: What the page plays.
-        max_error: Largest error after settling of each policy in each axis, m.
+        max_error: Largest errors after settling, by policy and axis, m.
         missing: Why a policy is not there, by name.
     """
 
@@ -87,7 +87,7 @@ def replayed(
         contenders: The policies.
         scenario: The scenario.
         workers: Number of processes.
-        progress: Called after each of them.
+        progress: Called whenever a policy has finished.
 
     Returns:
         What they did; nobody's if none of them acts.
@@ -107,7 +107,7 @@ def replayed(
             acted[contender.name] = outcome
     if not acted:
         return Episodes({"episodes": {}}, {}, missing)
-    longest = max(acted.values(), key=lambda each: len(each.reference))
+    longest = max(acted.values(), key=lambda run: len(run.reference))
     period = scenario.conditions.control_period
     shown = instants(scenario, FPS, 1.0)
     data = frame(scenario, scenario.reference_positions()[shown]) | {
@@ -115,9 +115,9 @@ def replayed(
         "period": period,
         "current": packed(longest.current),
         "reference": packed(longest.reference),
-        "episodes": {name: each.data for name, each in acted.items()},
+        "episodes": {name: run.data for name, run in acted.items()},
     }
-    return Episodes(data, {name: each.max_error for name, each in acted.items()}, missing)
+    return Episodes(data, {name: run.max_error for name, run in acted.items()}, missing)
 
 
 def act(contender: Contender, scenario: Scenario) -> Acted | str:
@@ -128,16 +128,16 @@ def act(contender: Contender, scenario: Scenario) -> Acted | str:
         return str(error)
     pictures, row = acted.pictures, score(acted.trajectory)
     data = {
-        "theta": packed(np.array([each.body.angles for each in pictures])),
-        "thrust": packed(np.array([each.thrust for each in pictures])),
+        "theta": packed(np.array([picture.body.angles for picture in pictures])),
+        "thrust": packed(np.array([picture.thrust for picture in pictures])),
         "error": packed(pictures[-1].errors[1:]),
         "effort": packed(np.abs(acted.trajectory.command).mean(axis=1)),
         "lost": acted.trajectory.lost,
     }
     return Acted(
         data,
-        np.array([each.reference.angles for each in pictures]),
-        np.array([each.current for each in pictures]),
+        np.array([picture.reference.angles for picture in pictures]),
+        np.array([picture.current for picture in pictures]),
         tuple(float(row[MAX_ERROR + axis]) for axis in PLANE),
     )
 
@@ -178,8 +178,8 @@ def frame(scenario: Scenario, path: Array) -> dict[str, Any]:
             "length": robot.link_length,
             "halfWidth": robot.half_width,
             "thrusters": [
-                {"link": each.link - 1, "normal": each.direction == "normal"}
-                for each in robot.thrusters
+                {"link": thruster.link - 1, "normal": thruster.direction == "normal"}
+                for thruster in robot.thrusters
             ],
         },
         "path": packed(path),
@@ -189,7 +189,7 @@ def frame(scenario: Scenario, path: Array) -> dict[str, Any]:
 def differing(
     errors: Mapping[str, tuple[float, ...]], expected: Mapping[str, tuple[float, ...]]
 ) -> list[str]:
-    """Policies whose largest errors in each axis, m, are not as expected."""
+    """Policies whose largest errors by axis, m, are not as expected."""
     return [
         name
         for name, wanted in expected.items()

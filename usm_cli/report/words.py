@@ -17,8 +17,10 @@ PAPERS = "sta"
 
 
 def in_axes(row: Scores, metric: str) -> str:
-    """The mean of a metric in each axis, in words."""
-    return listed([f"{mm(each.mean)} mm in {axis}" for axis, each in row.by_axis(metric).items()])
+    """The means of a metric, axis by axis, in words."""
+    return listed(
+        [f"{mm(summary.mean)} mm in {axis}" for axis, summary in row.by_axis(metric).items()]
+    )
 
 
 def competitors(rows: Mapping[str, Scores]) -> dict[str, Scores]:
@@ -30,7 +32,7 @@ def motion(rows: Mapping[str, Scores]) -> str:
     """What the joint motion does to the controller that it harms most."""
 
     def calm(row: Scores) -> float:
-        return sum(each.mean for each in row.by_axis("settled_error").values())
+        return sum(error.mean for error in row.by_axis("settled_error").values())
 
     known = {name: row for name, row in competitors(rows).items() if calm(row) > 0}
     if not known:
@@ -67,7 +69,7 @@ def in_words(scenario: Scenario) -> str:
         listed = ", ".join(f"{angle:+.2f} rad at {time:.1f} s" for angle, time in bends)
         listed = listed.replace("-", "−")
         parts.append(f"the last {scenario.inspection.bending_joints} joints bend by {listed}")
-    current = (sum(each**2 for each in water.current)) ** 0.5
+    current = (sum(speed**2 for speed in water.current)) ** 0.5
     parts.append(f"current {100 * current:.1f} cm/s")
     low, high = min(water.coefficients), max(water.coefficients)
     parts.append(f"true coefficients {low:.2f} to {high:.2f} of the nominal ones")
