@@ -69,7 +69,7 @@ class SortableTable:
 
 @dataclass(frozen=True)
 class Tables:
-    """Tables of the same kind, of which one is seen at a time.
+    """Tables of the same kind, one of them shown at a time.
 
     Attributes:
         title: Heading.

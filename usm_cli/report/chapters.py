@@ -75,7 +75,7 @@ def read(path: Path) -> Result:
     """A result from its file.
 
     Raises:
-        UsageError: If it is none, or of no kind that has a chapter.
+        UsageError: If it is not a result, or its kind has no chapter.
         OSError: If it cannot be read.
     """
     document = read_json(path)

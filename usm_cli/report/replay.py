@@ -90,7 +90,7 @@ def replayed(
         progress: Called whenever a policy has finished.
 
     Returns:
-        What they did; nobody's if none of them acts.
+        What they did; no episodes if none of them acts.
     """
     done: dict[int, Acted | str] = {}
     tasks = [(contender, scenario) for contender in contenders]

@@ -312,7 +312,7 @@ def checked_number(num_envs: Any) -> int:
     """A number of robots.
 
     Raises:
-        ValueError: If it is none, or too large.
+        ValueError: If it is not a positive integer, or too large.
     """
     allowed = f"1 to {MOST_ROBOTS}"
     require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)

@@ -48,10 +48,10 @@ def read_bytes(path: str | Path, largest: int = LARGEST, links: bool = True) -> 
 
 
 def read_text(path: str | Path) -> str:
-    """Read a file of text in UTF-8.
+    """Read a text file in UTF-8.
 
     Raises:
-        ValueError: If it is none, or no file as `read_bytes` takes it.
+        ValueError: If it is not UTF-8, or `read_bytes` refuses it.
         OSError: If it cannot be read.
     """
     try:
@@ -61,7 +61,7 @@ def read_text(path: str | Path) -> str:
 
 
 def read_json(path: str | Path, links: bool = True) -> Any:
-    """Read a file of JSON.
+    """Read a JSON file.
 
     Raises:
         ValueError: If it is not JSON, or `read_bytes` refuses it.

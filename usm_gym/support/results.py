@@ -112,7 +112,7 @@ class Result:
             path: The file.
 
         Raises:
-            UsageError: If it is none of this kind.
+            UsageError: If it is not a result of this kind.
         """
         with explaining(f"{path} is no complete {cls.kind}"):
             require(isinstance(document, Mapping), "content", document, "an object")

@@ -59,7 +59,7 @@ class Conditions:
     motion: Switch = True
 
     def __post_init__(self) -> None:
-        """Refuse a control period that is no multiple of the step, and ranges that are none."""
+        """Refuse a control period that is not a multiple of the step, and reversed ranges."""
         multiple = self.control_period / self.physics_step
         require(
             1 <= round(multiple) <= MOST_SUBSTEPS

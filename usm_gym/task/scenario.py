@@ -280,7 +280,7 @@ def mode_of(value: Any) -> Mode:
     """The mode of a name.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If there is no such mode.
     """
     require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
     mode: Mode = value
