@@ -90,8 +90,8 @@ def test_a_file_that_is_no_study_is_refused(tmp_path):
 
 
 @numba.njit
-def allocate(T, wrench, forces):
-    thrusters.allocate(T, wrench, 3, np.empty((7, 3)), forces)
+def forces(T, moment, found):
+    thrusters.allocate(T, np.array([3.0, -2.0, moment]), 3, np.empty((7, 3)), found)
 
 
 def test_the_printed_moment_row_is_a_smaller_heading_gain():
@@ -100,6 +100,6 @@ def test_the_printed_moment_row_is_a_smaller_heading_gain():
     printed = T.copy()
     printed[2] /= l
     ours, theirs = np.empty((2, 5))
-    allocate(T, np.array([3.0, -2.0, 4.0 * l]), ours)
-    allocate(printed, np.array([3.0, -2.0, 4.0]), theirs)
+    forces(T, 4.0 * l, ours)
+    forces(printed, 4.0, theirs)
     np.testing.assert_allclose(ours, theirs, rtol=1e-12)
