@@ -224,7 +224,7 @@ def test_compare_draws_no_conclusion_from_few_episodes(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["compare", "zero", "zero"], "another than A"),
+        (["compare", "zero", "zero"], "another policy than A"),
         (["compare", "zero", "nobody"], "nobody"),
         (["compare", "zero", "missing.json"], "missing.json"),
         (["compare", "zero", "suite.json"], "suite.json is no complete evaluation: kind is None"),
