@@ -14,7 +14,6 @@ from usm_baselines.benchmark.scoring import (
     Job,
     Refusal,
     score_all,
-    shared_nominal,
 )
 from usm_baselines.contender import Contender
 from usm_baselines.registry import entry, ids
@@ -22,11 +21,11 @@ from usm_baselines.registry import entry, ids
 from usm_cli.options import add_computing, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
 from usm_gym.evaluation import BATCH, Evaluation
-from usm_gym.robot import Robot
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.validation import explaining, require
 from usm_gym.task.conditions import Conditions
+from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import MODES, Mode, Scenario
 
 POLICIES = """\
@@ -159,12 +158,11 @@ def jobs(
     Raises:
         ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
     """
-    robot = Robot()
-    nominal = shared_nominal(robot, scenarios)
+    nominal = shared_nominal(scenarios)
     listed = []
     for contender in contenders:
         contender.make(nominal)
-        listed.append(Job(contender, tuple(scenarios), nominal, robot, time_limit))
+        listed.append(Job(contender, tuple(scenarios), nominal, time_limit))
     return listed
 
 

@@ -32,7 +32,7 @@ def robot_of(value: str | Mapping[str, Any] | Robot | None) -> Robot:
     if isinstance(value, str):
         require(value in _robots, "robot", value, ", ".join(_robots))
         return _robots[value]
-    return value if isinstance(value, Robot) else read_robot(value or {})
+    return value if isinstance(value, Robot) else read_robot({} if value is None else value)
 
 
 def name_of(robot: Robot) -> str | Robot:

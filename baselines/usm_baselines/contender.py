@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any
 
 from usm_baselines.gains import read_gains
-from usm_baselines.registry import Entry, entry, tuned
+from usm_baselines.registry import Registration, entry, tuned
 from usm_gym.policy import Policy
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.nominal import Nominal
@@ -88,7 +88,7 @@ def contender(name: str) -> Contender:
     return registered(name, entry(name))
 
 
-def registered(name: str, entry: Entry) -> Contender:
+def registered(name: str, entry: Registration) -> Contender:
     """A registered policy as a contender."""
     factory = entry.factory
     settings: list[Any] = []

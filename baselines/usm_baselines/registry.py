@@ -30,7 +30,7 @@ from usm_gym.task.nominal import Nominal
 
 
 @dataclass(frozen=True)
-class Entry:
+class Registration:
     """A registered policy.
 
     Attributes:
@@ -48,7 +48,7 @@ class Entry:
     privileged: bool = False
 
 
-_entries: dict[str, Entry] = {}
+_entries: dict[str, Registration] = {}
 
 
 def register(
@@ -77,7 +77,7 @@ def register(
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    _entries[id] = Entry(factory, summary, chosen, slow, privileged)
+    _entries[id] = Registration(factory, summary, chosen, slow, privileged)
     shipped = TUNED / f"{id}.json"
     if shipped.is_file():
         _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
@@ -90,14 +90,14 @@ def _declared_space(factory: Any) -> Space:
     return space_of(factory.Gains) if law else {}
 
 
-def tuned(file: GainsFile) -> Entry:
+def tuned(file: GainsFile) -> Registration:
     """The registered policy that a file of gains is for, with these gains.
 
     Raises:
         ValueError: If there is no such policy.
     """
     base, budget = entry(file.policy), file.budget
-    return Entry(
+    return Registration(
         partial(base.factory, **file.gains),
         f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
         slow=base.slow,
@@ -110,7 +110,7 @@ def ids() -> list[str]:
     return list(_entries)
 
 
-def entry(id: str) -> Entry:
+def entry(id: str) -> Registration:
     """The registered policy of a name.
 
     Raises:

@@ -19,6 +19,7 @@ from usm_cli.commands import leaderboard
 from usm_cli.program import main
 from usm_gym.suites import suite
 from usm_gym.support.files import holding
+from usm_gym.task.nominal import shared_nominal
 
 ROOT = Path(__file__).parents[2]
 SUITES = {board.MAIN: short(3), "other": short(2, seed=1)}
@@ -117,7 +118,7 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
         (folder / "front" / f"mine-{weight}.json").write_text(text)
     registry.register("mine", registry.entry("pd").factory, "mine")
     assert registry.ids()[-2:] == ["mine", "mine-tuned"]
-    nominal = board.shared_nominal(board.Robot(), SUITES[board.MAIN])
+    nominal = shared_nominal(SUITES[board.MAIN])
     tuned: Any = registry.make("mine-tuned", nominal)
     assert tuned.gains.k_p == 3.0
     assert "9 trials of 8 episodes" in registry.entry("mine-tuned").summary
@@ -185,7 +186,7 @@ def test_readme_and_results_show_the_tables_of_the_leaderboard() -> None:
 
 
 def test_shipped_gains_can_be_made() -> None:
-    nominal = board.shared_nominal(board.Robot(), SUITES[board.MAIN])
+    nominal = shared_nominal(SUITES[board.MAIN])
     files = [*gains.TUNED.glob("*.json"), *gains.FRONT.glob("*.json")]
     budgets = set()
     for file in files:

@@ -239,7 +239,7 @@ def test_a_state_that_is_not_finite_is_a_loss_too() -> None:
 
 def test_nothing_is_scored_after_a_loss() -> None:
     away = replace(short("torpedo", "ideal", 0), path=Path(speed=0.3, amplitude=0.0))
-    trajectory = rollout(Still(), [away, replace(away, path=Path(speed=0.0))], ROBOT)[0]
+    trajectory = rollout(Still(), [away, replace(away, path=Path(speed=0.0))])[0]
     assert trajectory.lost
     assert len(trajectory.time) == len(trajectory.error) == len(trajectory.command)
     assert np.abs(trajectory.error[-1]).max() > 0.5

@@ -17,7 +17,6 @@ from usm_baselines.paper.paper_rate import Record
 
 from usm_cli.take import instants, take
 from usm_gym.evaluation import score
-from usm_gym.robot import Robot
 from usm_gym.support import parallel
 from usm_gym.support.validation import UsageError
 from usm_gym.task.metrics import MAX_ERROR
@@ -111,7 +110,7 @@ def replayed(
     longest = max(acted.values(), key=lambda episode: len(episode.reference))
     period = scenario.conditions.control_period
     shown = instants(scenario, FPS, 1.0)
-    data = frame(scenario, Robot(), scenario.reference_positions()[shown]) | {
+    data = frame(scenario, scenario.reference_positions()[shown]) | {
         "start": period,
         "period": period,
         "current": packed(longest.current),
@@ -149,7 +148,7 @@ def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any
     first = next(iter(records.values()))
     spacing = float(first.time[1] - first.time[0])
     every, sparse = round(RECORD_PERIOD / spacing), round(1.0 / (FPS * spacing))
-    return frame(scenario, Robot(), first.reference[::sparse]) | {
+    return frame(scenario, first.reference[::sparse]) | {
         "start": 0.0,
         "period": every * spacing,
         "current": None,
@@ -167,8 +166,9 @@ def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any
     }
 
 
-def frame(scenario: Scenario, robot: Robot, path: Array) -> dict[str, Any]:
+def frame(scenario: Scenario, path: Array) -> dict[str, Any]:
     """The data that all policies of a scenario share; path: at every picture, m, (k, 2)."""
+    robot = scenario.body
     return {
         "duration": scenario.duration,
         "settle": scenario.settle_time,

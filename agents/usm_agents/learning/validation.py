@@ -10,18 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from usm_baselines.benchmark.scoring import shared_nominal
-
 from usm_agents.artifact.network import Network
 from usm_agents.learning.plan import TEST_SEED, Plan
 from usm_agents.residual.task import Residual, ResidualPolicy
 from usm_gym.evaluation import evaluate
-from usm_gym.robot import Robot
 from usm_gym.suites import unseen
 from usm_gym.support.seeding import VALIDATION, stream
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
+from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Scenario
 
 # Held-out scenarios of the training distribution, the same for all trainings.
@@ -38,7 +36,7 @@ def held_out(plan: Plan, residual: Residual, episodes: int) -> list[Scenario]:
     """
     scenarios = [plan.scenario(stream(0, VALIDATION, i)) for i in range(episodes)]
     require(
-        shared_nominal(Robot(), scenarios) == residual.nominal,
+        shared_nominal(scenarios) == residual.nominal,
         "conditions",
         plan.conditions,
         "one nominal knowledge for all scenarios",

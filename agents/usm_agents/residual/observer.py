@@ -38,7 +38,7 @@ class Plain(NamedTuple):
     scale: Array
 
 
-class Table(NamedTuple):
+class FrameTable(NamedTuple):
     """The layout of the agent's observation, for the kernel.
 
     Attributes:
@@ -208,7 +208,7 @@ class ResidualObserver:
         whole = ResidualLayout(plain.thrusters, actions, entries)
         numbers, slices = np.arange(whole.size), whole.slices
         places = [numbers[slices[entry.name]] for entry in entries]
-        self._table = Table(
+        self._table = FrameTable(
             starts=np.array([slices[name].start for name in ENTRY._fields]),
             base=np.array([places, columns], np.int64).reshape(2, -1).T.copy(),
             shown=np.concatenate([numbers[slices[entry.name]] for entry in self.layout.frame]),

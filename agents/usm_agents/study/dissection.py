@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.benchmark.scoring import shared_nominal
 from usm_baselines.estimation.estimator import Estimator
 from usm_baselines.laws.oracle import Oracle
 
@@ -24,10 +23,9 @@ from usm_agents.study.results import Dissection, ForceShares
 from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy
-from usm_gym.robot import Robot
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import FIELD
-from usm_gym.task.nominal import Nominal
+from usm_gym.task.nominal import Nominal, shared_nominal
 from usm_gym.task.scenario import Scenario
 from usm_gym.world import world_of
 
@@ -156,7 +154,7 @@ def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
     for training in chosen:
         if training.name in AGENTS and training.plan.seed == 0:
             episodes = unseen(training.plan.mode, FIELD, TEST_SEED, EPISODES)
-            nominal = shared_nominal(Robot(), episodes)
+            nominal = shared_nominal(episodes)
             policy = make_agent(nominal, str(training.folder))
             made[training.name] = dissect(policy, nominal, episodes)
     return made

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from usm_baselines.benchmark.scoring import Job, Refusal, score_all, shared_nominal
+from usm_baselines.benchmark.scoring import Job, Refusal, score_all
 from usm_baselines.contender import Contender, contender
 
 from usm_agents.artifact.folder import agent_contender
@@ -25,13 +25,13 @@ from usm_agents.study.results import (
 )
 from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import Evaluation, joined
-from usm_gym.robot import Robot
 from usm_gym.statistics import interquartile_mean, interval, ratio_interval
 from usm_gym.suites import unseen
 from usm_gym.support.results import Provenance
 from usm_gym.support.validation import UsageError
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.metrics import MAX_ERROR, axes_of
+from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Mode
 
 # Kept of each episode in each axis, and besides.
@@ -42,7 +42,6 @@ def jobs(
     chosen: Sequence[StudyTraining], rivals: Sequence[str], episodes: int = TEST_EPISODES
 ) -> dict[tuple[str, str], Job]:
     """What is scored, by policy and set: all at home, agents and rivals also elsewhere."""
-    robot = Robot()
     modes = {training.plan.mode for training in chosen}
     sets = {
         (mode, name): unseen(
@@ -56,8 +55,8 @@ def jobs(
     def add(name: str, policy: Contender, mode: Mode, everywhere: bool) -> None:
         for (its, kind), chosen in sets.items():
             if its == mode and (everywhere or kind == HOME):
-                nominal = shared_nominal(robot, chosen)
-                planned[name, kind] = Job(policy, tuple(chosen), nominal, robot)
+                nominal = shared_nominal(chosen)
+                planned[name, kind] = Job(policy, tuple(chosen), nominal)
 
     for training in chosen:
         agent = agent_contender(str(training.folder))

@@ -13,17 +13,17 @@ from usm_baselines.benchmark.results import (
     Summary,
     require_alike,
 )
-from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal, shared_nominal
+from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal
 from usm_baselines.contender import Contender, contender
 from usm_baselines.gains import FRONT, read_gains
 from usm_baselines.registry import ids
 from usm_gym.evaluation import Evaluation
-from usm_gym.robot import Robot
 from usm_gym.statistics import compare, interquartile_mean, interval
 from usm_gym.suites import NAMES, suite
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.metrics import MAX_ERROR, axes_of
+from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Scenario
 
 MAIN = "operation"
@@ -196,13 +196,12 @@ def places(
     time_limit: float = TIME_LIMIT,
 ) -> list[Place]:
     """Every policy on every suite, and the fronts on the main one."""
-    robot = Robot()
     listed = []
     for name, scenarios in chosen.items():
-        nominal = shared_nominal(robot, scenarios)
+        nominal = shared_nominal(scenarios)
         besides = [each for row in fronts.values() for each in row] if name == MAIN else []
         for each in (*contenders, *besides):
-            listed.append(Place(name, Job(each, tuple(scenarios), nominal, robot, time_limit)))
+            listed.append(Place(name, Job(each, tuple(scenarios), nominal, time_limit)))
     return listed
 
 

@@ -13,12 +13,12 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Discriminator, Field, Tag
 
 from usm_baselines.benchmark.results import Scores, axes_in, require_alike
-from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal, shared_nominal
+from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import Evaluation
-from usm_gym.robot import Robot
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.validation import Number, require, validated
+from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import StoredScenarios
 
@@ -199,15 +199,13 @@ def jobs(
     time_limit: float = TIME_LIMIT,
 ) -> list[Job]:
     """One job for each policy and value, values of one policy side by side."""
-    robot = Robot()
-    nominal = shared_nominal(robot, scenarios)
+    nominal = shared_nominal(scenarios)
     varied = [tuple(quantity.vary(each, value) for each in scenarios) for value in values]
     return [
         Job(
             each,
             batch,
             replace(nominal, control_period=batch[0].conditions.control_period),
-            robot,
             time_limit,
         )
         for each in contenders

@@ -26,7 +26,6 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import BATCH, Evaluation, evaluate, joined, metric_names
 from usm_gym.policy import Policy
-from usm_gym.robot import Robot
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
 from usm_gym.support.validation import (
@@ -64,14 +63,12 @@ class Job:
         contender: The policy.
         scenarios: The episodes.
         nominal: The knowledge from which the policy is made.
-        robot: The robot.
         time_limit: How long a policy whose code is not known may think in a batch, s.
     """
 
     contender: Contender
     scenarios: tuple[Scenario, ...]
     nominal: Nominal
-    robot: Robot = dataclasses.field(default_factory=Robot)
     time_limit: float = TIME_LIMIT
 
     def __post_init__(self) -> None:
@@ -88,20 +85,8 @@ class Job:
             self.contender.identity,
             [scenario.to_dict() for scenario in self.scenarios],
             dataclasses.asdict(self.nominal),
-            dataclasses.asdict(self.robot),
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-def shared_nominal(robot: Robot, scenarios: Sequence[Scenario]) -> Nominal:
-    """The nominal knowledge that goes with scenarios.
-
-    Raises:
-        ValueError: If they do not agree in it.
-    """
-    nominal, *others = {scenario.nominal for scenario in scenarios}
-    require(not others, "scenarios", f"{len(others) + 1} kinds", "one nominal knowledge for all")
-    return nominal
 
 
 @pydantic_dataclass(frozen=True, config=CONFIG)
@@ -169,7 +154,7 @@ def score_batch(job: Job, first: int, last: int) -> Evaluation | Refusal:
         policy = job.contender.make(job.nominal)
         if job.contender.identity is None:  # ours are never refused for a slow machine
             policy = Timed(policy, job.time_limit)
-        return evaluate(policy, scenarios, robot=job.robot)
+        return evaluate(policy, scenarios)
     except (Exception, SystemExit) as error:  # whatever a controller may do
         kind = "" if isinstance(error, ValueError | TimeoutError) else f"{type(error).__name__}: "
         return Refusal(kind + in_one_line(error))

@@ -24,18 +24,18 @@ from optuna.trial import TrialState
 from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
-from usm_baselines.benchmark.scoring import Job, Refusal, score_all, score_batch, shared_nominal
+from usm_baselines.benchmark.scoring import Job, Refusal, score_all, score_batch
 from usm_baselines.contender import registered
 from usm_baselines.gains import Budget, GainsFile
 from usm_baselines.registry import entry, tuned
 from usm_baselines.space import Space
 from usm_gym.evaluation import Evaluation, joined
-from usm_gym.robot import Robot
 from usm_gym.support import parallel
 from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
@@ -107,9 +107,9 @@ class Problem:
     def job(self, gains: dict[str, float], purpose: int) -> Job:
         """The policy with some gains on these scenarios."""
         file = GainsFile(self.policy, gains, self.budget, self.weight)
-        scenarios, robot = self.scenarios(purpose), Robot()
+        scenarios = self.scenarios(purpose)
         contender = registered(self.policy, tuned(file))
-        return Job(contender, scenarios, shared_nominal(robot, scenarios), robot)
+        return Job(contender, scenarios, shared_nominal(scenarios))
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 from usm_baselines.benchmark.robustness import QUANTITIES, jobs
-from usm_baselines.benchmark.scoring import Refusal, score_all, shared_nominal
+from usm_baselines.benchmark.scoring import Refusal, score_all
 from usm_baselines.contender import contender
 
-from usm_gym import Robot, suite
+from usm_gym import suite
+from usm_gym.task.nominal import shared_nominal
 
 SCENARIOS = suite("operation")[:2]
 
@@ -42,7 +43,7 @@ def test_the_suites_own_value_changes_nothing_and_another_one_thing(
 
 
 def test_policies_keep_the_nominal_knowledge_but_know_their_period() -> None:
-    nominal = shared_nominal(Robot(), SCENARIOS)
+    nominal = shared_nominal(SCENARIOS)
     for name, quantity in QUANTITIES.items():
         for job, value in zip(
             jobs([contender("pd")], SCENARIOS, quantity, quantity.values),

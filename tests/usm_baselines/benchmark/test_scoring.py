@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 from support.episodes import short
 from usm_baselines.benchmark import scoring
-from usm_baselines.benchmark.scoring import Job, Refusal, score_all, shared_nominal
+from usm_baselines.benchmark.scoring import Job, Refusal, score_all
 from usm_baselines.contender import Contender, contender
 
 import usm_gym
 from usm_gym import Robot
 from usm_gym.evaluation import Evaluation
+from usm_gym.task.nominal import shared_nominal
 
 ROBOT = Robot()
 SCENARIOS = tuple(short(3))
@@ -85,7 +86,7 @@ def job(policy: str | Callable[[], Any] = "zero", scenarios: Any = SCENARIOS) ->
         known = contender(policy)
     else:
         known = Contender(policy.__name__, lambda nominal: policy())
-    return Job(known, scenarios, shared_nominal(ROBOT, scenarios), ROBOT)
+    return Job(known, scenarios, shared_nominal(scenarios))
 
 
 def assert_same(one: Any, other: Any) -> None:
@@ -197,7 +198,7 @@ def test_a_key_tells_all_that_scores_depend_on() -> None:
         job("sta", SCENARIOS[:2]),
         job("sta", SCENARIOS[::-1]),
         replace(one, nominal=replace(one.nominal, position_noise=1.0)),
-        replace(one, robot=replace(ROBOT, joint_damping=6.0)),
+        job("sta", [replace(SCENARIOS[0], robot=replace(ROBOT, joint_damping=6.0))]),
         replace(one, contender=replace(one.contender, identity="other sources")),
     ]
     assert len({each.key for each in (one, *others)}) == len(others) + 1
@@ -215,7 +216,7 @@ from usm_gym import Robot
 jobs = []
 for seed in range(8):
     scenarios = tuple(short(2, 20.0, seed))
-    nominal = scoring.shared_nominal(Robot(), scenarios)
+    nominal = shared_nominal(scenarios)
     jobs.append(scoring.Job(contender("sta"), scenarios, nominal))
 for outcome in scoring.score_all(jobs, cache=Path(sys.argv[1])):
     print(outcome.per_episode["max_error_x"].tolist())

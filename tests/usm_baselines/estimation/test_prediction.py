@@ -7,7 +7,7 @@ import numpy as np
 import usm_baselines
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.prediction import Predictor
-from usm_baselines.signals import Signals, model_of
+from usm_baselines.signals import Signals
 
 from usm_gym import Robot, Scenario, evaluate
 from usm_gym.simulation import Simulation
@@ -43,7 +43,7 @@ def test_the_nominal_plant_is_foreseen() -> None:
     """Commands that are held, joints in full motion: where it goes and where it is said to go."""
     nominal = scenario().nominal
     correction = kalman.linear_model(nominal, 1e-2, 0.1).correction
-    predictor = Predictor(nominal, model_of(nominal), correction)
+    predictor = Predictor(nominal, correction)
     state = np.zeros((1, predictor.size))
     simulation = Simulation([scenario()])
     rng = np.random.default_rng(0)
