@@ -279,4 +279,4 @@ def test_of_two_commands_on_one_output_the_second_gets_one_line(
 def test_the_help_says_that_a_cluster_runs_code(capsys: pytest.CaptureFixture[str]) -> None:
     main(["evaluate", "--help"])
     text = " ".join(capsys.readouterr().out.split())
-    assert "Ray runs the code of whoever reaches it" in text
+    assert "Ray runs the code of whoever can reach it" in text
