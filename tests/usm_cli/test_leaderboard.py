@@ -120,7 +120,7 @@ def test_compare_draws_no_conclusion_from_few_episodes(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["compare", "zero", "zero"], "another than A"),
+        (["compare", "zero", "zero"], "another policy than A"),
         (["compare", "zero", "nobody"], "nobody"),
         (["compare", "zero", "missing.json"], "missing.json"),
         (["compare", "zero", "suite.json"], "suite.json is no complete evaluation: kind is None"),
@@ -174,4 +174,4 @@ def test_of_two_commands_on_one_output_the_second_gets_one_line(
 def test_the_help_says_that_a_cluster_runs_code(capsys: pytest.CaptureFixture[str]) -> None:
     main(["evaluate", "--help"])
     text = " ".join(capsys.readouterr().out.split())
-    assert "Ray runs the code of whoever reaches it" in text
+    assert "Ray runs the code of whoever can reach it" in text

@@ -1,1 +1,1 @@
-"""The subcommands of `usm`, one file each."""
+"""The subcommands of `usm`, one per file."""

@@ -1,4 +1,4 @@
-"""The tables of a page."""
+"""Makes the tables of a page."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ CONDITIONS = (
 
 
 def competes(row: Scores) -> bool:
-    """Whether a policy is told no more than a vehicle knows."""
+    """Whether a policy knows no more than a vehicle does."""
     return row.competitor if isinstance(row, CompetitorScores) else True
 
 
 def lead_of(row: Scores) -> Lead | None:
-    """A row's lead over the next, if it has one."""
+    """A row's lead over the next row, if it has one."""
     return row.beats_next if isinstance(row, Standing) else None
 
 
 def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> SortableTable:
-    """Scores of policies on the same scenarios, a row each."""
+    """Scores of policies on the same scenarios, one row per policy."""
     scale = LogScale(error for row in rows.values() for error in row.errors.values())
     decided = any(lead_of(row) for row in rows.values())
     axes = axes_in(rows.values())
@@ -79,7 +79,7 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
 
 
 def curve_table(result: RobustnessResult) -> SortableTable:
-    """Mean errors at each value of a quantity, a row for each policy and axis."""
+    """Mean errors at all values of a quantity, one row per policy and axis."""
     body = []
     notes = []
     for name, points in result.results.items():
@@ -119,13 +119,13 @@ def paper_table(result: ReproductionResult) -> SortableTable:
 
 
 def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
-    """Under which conditions the episodes of each suite run, a row for each suite."""
+    """The conditions of the episodes of suites, one row per suite."""
     body = []
     for name, scenarios in suites.items():
         conditions = scenarios[0].conditions
-        modes = ", ".join(sorted({each.mode for each in scenarios}))
+        modes = ", ".join(sorted({scenario.mode for scenario in scenarios}))
         low, high = conditions.coefficient_range
-        moving = any(each.shifts for each in scenarios)
+        moving = any(scenario.shifts for scenario in scenarios)
         current = 100 * (conditions.current_limit + conditions.current_variation)
         cells = [Cell(name, name), Cell(str(len(scenarios)), len(scenarios)), Cell(modes, modes)]
         for value in (
@@ -143,23 +143,24 @@ def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
 
 
 class LogScale:
-    """A logarithmic scale on which all errors of a table have their place.
+    """A logarithmic scale for all errors of a table.
 
     Attributes:
-        ticks: Decades in mm, and where they are, per cent.
+        ticks: Decades in mm and their places, per cent.
     """
 
     def __init__(self, errors: Iterable[Summary]) -> None:
         """Span means, intervals and worst episodes, m."""
-        positive = [each for error in errors for each in _numbers(error) if each > 0] or [1e-3]
+        numbers = [number for error in errors for number in _numbers(error)]
+        positive = [number for number in numbers if number > 0] or [1e-3]
         self._low = math.log10(min(positive)) - 0.1
         self._width = math.log10(max(positive)) + 0.1 - self._low
         decades = range(math.ceil(self._low), math.floor(self._low + self._width) + 1)
         self.ticks = [(f"{10.0 ** (power + 3):g}", self._place(10.0**power)) for power in decades]
 
     def marks(self, errors: Mapping[str, Summary]) -> dict[str, Mark]:
-        """Where errors are, by axis."""
-        return {axis: Mark(*map(self._place, _numbers(each))) for axis, each in errors.items()}
+        """The places of errors, by axis."""
+        return {axis: Mark(*map(self._place, _numbers(error))) for axis, error in errors.items()}
 
     def _place(self, metres: float) -> float:
         power = math.log10(metres) if metres > 0 else self._low
@@ -178,7 +179,7 @@ def length(metres: float) -> Cell:
 
 
 def decision(lead: Lead | None) -> Cell:
-    """Whether a row is better than the next, and with what probability in an episode."""
+    """Whether a row is better than the next, and with what probability per episode."""
     if lead is None:
         return Cell("", -1.0)
     return Cell(in_short(lead), lead.probability, f"{lead.probability:.2f}")
