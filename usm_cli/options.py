@@ -1,4 +1,4 @@
-"""Options that commands share: conditions, what to compute on, where to write."""
+"""Options that commands share: conditions, workers, output."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from usm_gym.task.conditions import Conditions, conditions_of
 
 # How long a cluster may take to accept a connection, s.
 CONNECTION_TIME = 10.0
-# The largest count that an option takes: more is a slip of the pen.
+# The largest count that an option takes; more is a typing mistake.
 MOST, MOST_WORKERS = 1_000_000_000, 1000
 
 
 def check_installed(what: str, extra: str, *modules: str) -> None:
-    """Refuse what needs a module that is not installed.
+    """Refuse to go on without the modules of an extra.
 
     Args:
-        what: What needs it.
-        extra: The extra that it comes with.
-        modules: Names under which the modules are imported.
+        what: What needs them.
+        extra: The extra that they come with.
+        modules: The names under which they are imported.
 
     Raises:
-        UsageError: If one is not there.
+        UsageError: If one is not installed.
     """
     for module in modules:
         if find_spec(module) is None:
@@ -41,20 +41,20 @@ def check_installed(what: str, extra: str, *modules: str) -> None:
 
 
 def add_computing(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say on what to compute."""
+    """Add the options for processes and clusters."""
     add = parser.add_argument
-    add("--workers", type=int, metavar="N", help="processes (default: 1; of a cluster: all)")
+    add("--workers", type=int, metavar="N", help="processes (default: 1; on a cluster: all)")
     add(
         "--cluster",
         metavar="ADDRESS",
-        help="a Ray cluster of your own to compute on (the extra `cluster`); Ray runs the code of "
-        "anyone who can reach it",
+        help="compute on your own Ray cluster (extra `cluster`); Ray runs the code of whoever "
+        "can reach it",
     )
 
 
 @contextmanager
 def computing(arguments: argparse.Namespace) -> Iterator[int]:
-    """Make the cluster that the options ask for joblib's backend; gives the number of workers."""
+    """Make the chosen cluster joblib's backend, and give the number of workers."""
     workers = arguments.workers
     allowed = f"1 to {MOST_WORKERS}"
     require(workers is None or 1 <= workers <= MOST_WORKERS, "--workers", workers, allowed)
@@ -79,7 +79,7 @@ def computing(arguments: argparse.Namespace) -> Iterator[int]:
 
 
 def check_reachable(address: str) -> None:
-    """Raise `ConnectionError` now where nobody listens, for whom Ray would wait for minutes."""
+    """Raise `ConnectionError` at once if nobody listens; Ray itself would wait for minutes."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon:
         return  # a word that Ray knows, such as "auto"
@@ -87,19 +87,19 @@ def check_reachable(address: str) -> None:
     require(known, "--cluster", address, "HOST:PORT")
     try:
         socket.create_connection((host, int(port)), CONNECTION_TIME).close()
-    except (OSError, UnicodeError) as error:  # the latter of a host that cannot be a name
+    except (OSError, UnicodeError) as error:  # the latter for an invalid host name
         raise ConnectionError(f"no Ray cluster at {address}: {error}") from error
 
 
 def parse_conditions(text: str) -> Conditions:
-    """Conditions from a preset's name or a JSON object."""
+    """Read conditions from a preset's name or a JSON object."""
     if text.lstrip()[:1] not in ("{", "["):
         return conditions_of(text)
     return conditions_of(parse_json(text, f"--conditions {text}"))
 
 
 def count(arguments: Any, option: str, default: int, least: int = 1) -> int:
-    """An integer option, or its default.
+    """Get an integer option or its default.
 
     Raises:
         ValueError: If it is too small or too large.
@@ -111,7 +111,7 @@ def count(arguments: Any, option: str, default: int, least: int = 1) -> int:
 
 
 def output_folder(name: str) -> Path:
-    """An output folder with figures, made if it is not there.
+    """Get an output folder for figures, and make it if necessary.
 
     Raises:
         ValueError: If figures cannot be drawn.

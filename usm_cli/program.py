@@ -1,4 +1,4 @@
-"""The `usm` command."""
+"""Runs the `usm` command: its parser and its exit status."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
 A first look:
 
-  usm evaluate                 every policy on the fifty frozen operation scenarios
-  usm policies                 what there is to compare
-  usm compare A B              whether one of them is better than another
-  usm leaderboard              all of them on all frozen suites
-  usm robustness --vary noise  how they fare when something gets worse
-  usm watch                    one of them at work
-  usm report RESULT.json       a page with all of it, to be played
-  usm tune POLICY              better gains for one of them
-  usm train --output DIR       an agent that adds thrust to one of them
-  usm study residual           what trained agents owe to what
-  usm reproduce                the paper's Table 1 and figures
-  usm bench                    how fast all this is here
+  usm evaluate                 score the policies on the fifty frozen operation scenarios
+  usm policies                 list the policies
+  usm compare A B              decide whether one policy is better than another
+  usm leaderboard              score all policies on all frozen suites
+  usm robustness --vary noise  see how errors grow when something gets worse
+  usm watch                    watch a policy
+  usm report RESULT.json       turn results into a page with replays
+  usm tune POLICY              search for better gains
+  usm train --output DIR       train an agent that adds thrust to a policy
+  usm study residual           train agents and see what their ingredients contribute
+  usm reproduce                regenerate the paper's Table 1 and figures
+  usm bench                    measure the speed on this machine
 """
 
 
@@ -65,7 +65,7 @@ BUG = "usm: this is a bug in usm-gym; please report it with the lines above"
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and leave with its status.
 
-    It is 2 for bad input and for output that cannot be written, and 1 for a bug of ours.
+    The status is 2 for bad input and for output that cannot be written, and 1 for our own bugs.
     """
     status: Any = None
     debug = False
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             status = left.code
         sys.stdout.flush()
     except BrokenPipeError:
-        status = 1  # the reader has gone, and knows
+        status = 1  # the reader has gone and knows it
     except (UsageError, OSError) as error:
         if debug:
             traceback.print_exc()
@@ -96,9 +96,7 @@ def parser() -> Parser:
     """The parser of all commands."""
     parser = Parser(prog="usm", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
-    parser.add_argument(
-        "--debug", action="store_true", help="show where in the code an error was found"
-    )
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
     for command in COMMANDS:
         command.add_to(subparsers)

@@ -1,4 +1,4 @@
-"""Which policies on which scenarios: what `usm evaluate`, `compare` and others have in common."""
+"""Options for policies and scenarios, which `usm evaluate`, `compare` and others share."""
 
 from __future__ import annotations
 
@@ -30,15 +30,17 @@ from usm_gym.task.scenario import MODES, Mode, Scenario
 
 POLICIES = """\
 policies:
-  an id (usm policies), ID@gains.json with gains from `usm tune`, the folder of an agent from
-  `usm train`, or my_module:MyController, a class or factory of your own with Stable-Baselines3's
-  predict (docs/own_controller.md)
+  an id (see usm policies), ID@gains.json with gains from `usm tune`, the folder of an agent from
+  `usm train`, or my_module:MyController, your own class or function with the predict method of
+  Stable-Baselines3 (docs/own_controller.md)
 """
 
 
 def add_policies(parser: argparse.ArgumentParser, default: str = "all competitors") -> None:
     """Add the option that names policies."""
-    parser.add_argument("--policies", metavar="A,B", help=f"names, by commas (default: {default})")
+    parser.add_argument(
+        "--policies", metavar="A,B", help=f"names, separated by commas (default: {default})"
+    )
 
 
 def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None:
@@ -49,23 +51,23 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
         metavar="NAME",
         help=f"frozen suite ({', '.join(NAMES)}; default: operation) or a file of scenarios",
     )
-    add("--seed", type=int, metavar="S", help="sample scenarios under this seed instead")
+    add("--seed", type=int, metavar="S", help="sample scenarios with this seed instead")
     if single:
-        add("--scenario", type=int, metavar="I", help="which of them, from 0 on (default: 0)")
+        add("--scenario", type=int, metavar="I", help="which scenario, from 0 (default: 0)")
         parser.set_defaults(episodes=None)
     else:
-        add("--episodes", type=int, metavar="N", help="how many to sample (default: 50)")
+        add("--episodes", type=int, metavar="N", help="number of sampled scenarios (default: 50)")
     add("--mode", choices=MODES, help="mode of sampled scenarios (default: operation)")
     add(
         "--conditions",
         metavar="C",
-        help="ideal, field, rough, or a JSON object of fields on top of field; "
-        "on a suite it overrides the suite's own (default: the suite's; field)",
+        help="ideal, field, rough, or a JSON object of fields that differ from field; "
+        "replaces the conditions of a suite (default: those of the suite, or field)",
     )
 
 
 def add_scoring(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say how scores are computed."""
+    """Add the options for scoring."""
     add_computing(parser)
     parser.add_argument(
         "--time-limit",
@@ -78,7 +80,7 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_contenders(names: str | None) -> list[Contender]:
-    """The policies that `--policies` asks for."""
+    """Get the policies that `--policies` names."""
     if names is None:
         chosen = [id for id in ids() if not (entry(id).slow or entry(id).privileged)]
     else:
@@ -88,23 +90,23 @@ def chosen_contenders(names: str | None) -> list[Contender]:
 
 
 def sampled(arguments: argparse.Namespace) -> bool:
-    """Whether the options ask for sampled scenarios."""
+    """Whether scenarios are to be sampled."""
     return any(value is not None for value in (arguments.seed, arguments.episodes, arguments.mode))
 
 
 def suite_name(arguments: argparse.Namespace) -> str | None:
-    """Name of the suite that the options ask for; None where scenarios are sampled."""
+    """The name of the chosen suite; None if scenarios are sampled."""
     return None if sampled(arguments) else arguments.suite or "operation"
 
 
 def seeds(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Where the scenarios come from."""
+    """The origin of the scenarios, for the provenance."""
     name = suite_name(arguments)
     return {"seed": arguments.seed or 0} if name is None else {"suite": name}
 
 
 def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
-    """The scenarios that the options ask for."""
+    """Get the scenarios that the options choose."""
     given = arguments.conditions
     conditions = None if given is None else parse_conditions(given)
     name = suite_name(arguments)
@@ -115,7 +117,7 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
         arguments.suite is None,
         "--suite",
         arguments.suite,
-        "no suite beside --seed, --episodes, --mode",
+        "no suite together with --seed, --episodes or --mode",
     )
     episodes = count(arguments, "episodes", 50)
     seed = count(arguments, "seed", 0, least=0)
@@ -124,7 +126,7 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
 
 
 def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
-    """The one scenario that the options ask for."""
+    """Get the one scenario that the options choose."""
     index = count(arguments, "scenario", 0, least=0)
     if sampled(arguments):
         arguments.episodes = index + 1
@@ -134,7 +136,7 @@ def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
 
 
 def read_suite(name: str) -> list[Scenario]:
-    """The scenarios of a frozen suite, or of a JSON file that holds a list of them."""
+    """Read the scenarios of a frozen suite, or of a JSON file with a list of them."""
     if not name.endswith(".json"):
         return suite(name)
     with explaining(f"{name} is no file of scenarios"):
@@ -151,23 +153,23 @@ def read_suite(name: str) -> list[Scenario]:
 def jobs(
     contenders: Iterable[Contender], scenarios: Sequence[Scenario], time_limit: float
 ) -> list[Job]:
-    """One job per policy, all on the same scenarios.
+    """Make one job per policy, all with the same scenarios.
 
     Raises:
         ValueError: If a policy cannot be made from the nominal knowledge of the scenarios.
     """
     nominal = shared_nominal(scenarios)
     listed = []
-    for policy in contenders:
-        policy.make(nominal)
-        listed.append(Job(policy, tuple(scenarios), nominal, time_limit))
+    for contender in contenders:
+        contender.make(nominal)
+        listed.append(Job(contender, tuple(scenarios), nominal, time_limit))
     return listed
 
 
 def scored(
     chosen: Sequence[Job], arguments: argparse.Namespace, cache: Path | None = None
 ) -> list[Evaluation | Refusal]:
-    """Score policies on what the options say, with a progress bar."""
+    """Run jobs with the workers of the options, and show a progress bar."""
     with computing(arguments) as workers, progress_bar() as bar:
         total = sum(len(job.scenarios) for job in chosen)
         line = bar.add_task("episodes", total=total)
@@ -177,7 +179,7 @@ def scored(
 def by_name(
     chosen: Sequence[Job], outcomes: Sequence[Evaluation | Refusal]
 ) -> tuple[dict[str, Evaluation], dict[str, str]]:
-    """The scores of jobs by the name of the policy, and why the others have none."""
+    """The scores of jobs by policy, and the reasons of the policies without scores."""
     scores: dict[str, Evaluation] = {}
     refused: dict[str, str] = {}
     for job, outcome in zip(chosen, outcomes, strict=True):
@@ -189,7 +191,7 @@ def by_name(
 
 
 def leave_if_refused(refused: Mapping[str, str]) -> None:
-    """Name the refused policies, one on a line, and leave with status 1 if there is one."""
+    """Print the refused policies, one per line, and exit with status 1 if there are any."""
     for name, reason in refused.items():
         print(f"usm: {name} is refused: {reason}", file=sys.stderr)
     if refused:

@@ -1,4 +1,4 @@
-"""Speed, measured against peers in one run: interleaved rounds, medians, spread."""
+"""Measures speed against peers in one run: interleaved rounds, medians, spread."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ env.step(env.action_space.sample())
 
 @dataclass(frozen=True)
 class Timing:
-    """A piece of work to be timed.
+    """A piece of work to time.
 
     Attributes:
         name: Key of its figure.
-        run: Does it once.
-        units: How many units of work that is.
-        scale: From seconds per unit to the figure: 1e9 for ns.
+        run: Does the work once.
+        units: Units of work in it.
+        scale: Factor from seconds per unit to the figure: 1e9 for ns.
     """
 
     name: str
@@ -92,11 +92,11 @@ class Growth:
 
 @validated
 class Machine:
-    """The machine that figures are of.
+    """The machine of the measurements.
 
     Attributes:
         processor: Its processor.
-        cores: How many cores it has, where that is known.
+        cores: Number of its cores, if known.
         system: Its operating system.
     """
 
@@ -110,12 +110,12 @@ class SpeedResult(Part, Result):
     """The figures of `usm bench`.
 
     Attributes:
-        medians: Medians by figure; in JSON they stand beside the other fields.
+        medians: Medians of the figures; in JSON they are beside the other fields.
         spread: The figures with their spread.
-        missing: Figures that need a package which is not installed.
-        growth: Costs for more links, robots and threads, if they were asked for.
+        missing: Figures that need a package that is not installed.
+        growth: Costs for more links, robots and threads, if measured.
         machine: The machine.
-        provenance: Where all this comes from.
+        provenance: The origin of the figures.
     """
 
     kind: ClassVar[str] = "bench"
@@ -135,7 +135,7 @@ class SpeedResult(Part, Result):
 
 
 def summarise(values: Any) -> Figure:
-    """Median and spread of one figure's rounds."""
+    """Summarise the rounds of one figure."""
     low, high = float(np.min(values)), float(np.max(values))
     return Figure(median=float(np.median(values)), low=low, high=high)
 
@@ -143,7 +143,7 @@ def summarise(values: Any) -> Figure:
 def interleaved(
     timings: list[Timing], rounds: int, progress: Callable[[], object]
 ) -> dict[str, list[float]]:
-    """Time everything once per round, after one run that is not counted."""
+    """Time everything once per round, after one run that does not count."""
     for timing in timings:
         timing.run()
     times: dict[str, list[float]] = {timing.name: [] for timing in timings}
@@ -159,9 +159,9 @@ def interleaved(
 def plant_timing(
     name: str, size: int, period: float, threads: int = 1, robot: Robot | None = None
 ) -> Timing:
-    """Physics steps of `size` robots, per robot and step, with the joints moving.
+    """Time physics steps of `size` robots, per robot and step, with moving joints.
 
-    Without thrust they have to keep near a reference that rests, or they would be lost.
+    They have no thrust, so their reference rests; otherwise they would be lost.
     """
     body = robot or Robot()
     conditions = Conditions(control_period=period, current_limit=0.0)
@@ -178,7 +178,7 @@ def plant_timing(
 
 
 def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
-    """Sampled scenarios whose reference rests, so that robots are not lost without a controller."""
+    """Sample scenarios with a resting reference, so that no controller is needed."""
     scenarios = [
         replace(
             sample("operation", conditions, stream(0, EVALUATION, i), robot),
@@ -190,9 +190,9 @@ def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
 
 
 def vector_timing(name: str, size: int, steps: int, threads: int = 1) -> Timing:
-    """Whole steps of the vector environment, per robot, within episodes.
+    """Time whole steps of the vector environment, per robot, within episodes.
 
-    Starts of episodes are timed by `start_timing`: how many there are depends on the policy.
+    `start_timing` times the starts of episodes, whose number depends on the policy.
     """
     envs = gym.make_vec(
         "usm_gym:USM-Operation-v0",
@@ -205,7 +205,7 @@ def vector_timing(name: str, size: int, steps: int, threads: int = 1) -> Timing:
 
 
 def start_timing(name: str, size: int) -> Timing:
-    """Starts of episodes in the vector environment: draw, noise, first observation; us."""
+    """Time starts of episodes in the vector environment: draw, noise, first observation; us."""
     envs = gym.make_vec(
         "usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point"
     )
@@ -214,24 +214,24 @@ def start_timing(name: str, size: int) -> Timing:
 
 
 def sync_timing(name: str, size: int, steps: int) -> Timing:
-    """The same through Gymnasium's `SyncVectorEnv` of single environments."""
+    """Time whole steps of Gymnasium's `SyncVectorEnv` of single environments."""
     envs = gym.make_vec("usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="sync")
     return _loop(name, envs, steps, size)
 
 
 def cartpole_timing(name: str, size: int, steps: int) -> Timing:
-    """Gymnasium's CartPole vector environment, per robot."""
+    """Time Gymnasium's CartPole vector environment, per robot."""
     envs = gym.make_vec("CartPole-v1", num_envs=size, vectorization_mode="vector_entry_point")
     return _loop(name, envs, steps, size)
 
 
 def swimmer_timing(name: str, steps: int) -> Timing:
-    """Gymnasium's Swimmer-v5; raises `ImportError` or a Gymnasium error without MuJoCo."""
+    """Time Gymnasium's Swimmer-v5; raises `ImportError` or a Gymnasium error without MuJoCo."""
     return _loop(name, gym.make("Swimmer-v5"), steps, 1)
 
 
 def mujoco_timing(name: str, steps: int) -> Timing:
-    """MuJoCo's C loop, Euler, on the same chain with ellipsoid fluid; `ImportError` without it."""
+    """Time MuJoCo's C loop, Euler, on the same chain in ellipsoid fluid, if it is installed."""
     import mujoco
     from mujoco import rollout
 
@@ -245,7 +245,7 @@ def mujoco_timing(name: str, steps: int) -> Timing:
 
 
 def mujoco_chain(robot: Robot) -> str:
-    """The robot without thrusters as a MuJoCo model."""
+    """Write the robot without thrusters as a MuJoCo model."""
     half = robot.half_length
     geom = (
         f'<geom type="ellipsoid" size="{half} {robot.half_height} {robot.half_width}" '
@@ -284,14 +284,14 @@ def _loop(
 
 
 def paper_rate() -> None:
-    """40 s at 1e-5 s with observer and super-twisting controller in every step."""
+    """Run 40 s at 1e-5 s with observer and super-twisting controller in every step."""
     scenario = named("table1", "operation")
     conditions = replace(scenario.conditions, control_period=1e-5, physics_step=1e-5)
     simulate(replace(scenario, conditions=conditions), Law())
 
 
 def evaluate_suite() -> None:
-    """The operation suite by all six policies of the main job."""
+    """Score six policies on the operation suite."""
     scenarios = suite("operation")
     nominal = scenarios[0].nominal
     for id in ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero"):
@@ -299,20 +299,20 @@ def evaluate_suite() -> None:
 
 
 def thousand_episodes() -> None:
-    """A thousand sampled operation episodes of 40 s with the super-twisting controller."""
+    """Score the super-twisting controller on a thousand sampled operation episodes of 40 s."""
     scenarios = [sample("operation", Conditions(), stream(1, EVALUATION, i)) for i in range(1000)]
     evaluate(make("sta", scenarios[0].nominal), scenarios)
 
 
 def timed(job: Callable[[], object]) -> float:
-    """Seconds that a job takes."""
+    """Time a job, s."""
     begin = time.perf_counter()
     job()
     return time.perf_counter() - begin
 
 
 def first_step(compile_anew: bool) -> float:
-    """Seconds from starting Python to the first step, with a warm or an empty kernel cache."""
+    """Time from starting Python to the first step, s, with a warm or an empty kernel cache."""
     with tempfile.TemporaryDirectory() as empty:
         environment = {**os.environ, **({"NUMBA_CACHE_DIR": empty} if compile_anew else {})}
         begin = time.perf_counter()
@@ -321,7 +321,7 @@ def first_step(compile_anew: bool) -> float:
 
 
 def growth(rounds: int) -> Iterator[Growth]:
-    """Cost per robot and physics step, ns, for more links, more robots, more threads."""
+    """Measure the cost per robot and physics step, ns, for more links, robots and threads."""
     for links in (4, 8, 16, 32, 64):
         body = growing_robot(links)
         for name, size, period in (("single", 1, SINGLE_PERIOD), ("batch", ROBOTS, BATCH_PERIOD)):
@@ -334,7 +334,7 @@ def growth(rounds: int) -> Iterator[Growth]:
 
 
 def growing_robot(links: int) -> Robot:
-    """A robot of any number of links, thrusters where the paper's stand."""
+    """Make a robot of any number of links, with thrusters in the paper's places."""
     places = sorted({1, *(max(2, round(links * place / 16)) for place in (3, 6, 11, 14))})
     normal = tuple(Thruster(link, "normal") for link in places)
     return Robot(links=links, thrusters=(Thruster(1, "axial"), *normal))
@@ -345,7 +345,7 @@ def _alone(timing: Timing, rounds: int) -> float:
 
 
 def machine() -> Machine:
-    """This machine."""
+    """Describe this machine."""
     model = platform.processor() or platform.machine()
     information = Path("/proc/cpuinfo")
     if information.exists():

@@ -1,4 +1,4 @@
-"""Episodes of policies, kept as pictures: what films and pages show."""
+"""Records episodes of policies as pictures, for films and pages."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Take:
     """An episode of a policy.
 
     Attributes:
-        name: The policy's.
-        pictures: One per frame, or fewer if the robot was lost, the last then showing that.
+        name: The policy's name.
+        pictures: One per frame, or fewer if the robot was lost, which the last one then shows.
         trajectory: The episode.
     """
 
@@ -50,8 +50,8 @@ def take(
     Args:
         contender: The policy.
         scenario: The scenario.
-        shown: The control instants of which pictures are wanted, in order.
-        progress: As of `usm_gym.evaluate`.
+        shown: The control instants of the pictures, in ascending order.
+        progress: See `usm_gym.evaluate`.
 
     Raises:
         ValueError: If the policy cannot be made or fails to act.
@@ -71,7 +71,7 @@ def take(
     policy = contender.make(scenario.nominal)
     try:
         (trajectory,) = rollout(policy, [scenario], progress, watch)
-    except (Exception, SystemExit) as error:  # whatever a controller may do
+    except (Exception, SystemExit) as error:  # a foreign controller may raise anything
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         raise UsageError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
     end = max(seen)

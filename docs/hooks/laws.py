@@ -51,7 +51,7 @@ def shipped(ids):
 
 
 def gains(ids):
-    """What a law declares of its gains, and their values in each policy."""
+    """The declared gains of a law, and their values in the policies."""
     names = shipped(ids)
     values = {id: made(id)._asdict() for id in names}
     lines = [
@@ -61,8 +61,8 @@ def gains(ids):
     for name, gain in declared(type(made(ids[0]))).items():
         # Readings of one law may differ in units and ranges.
         ranges = [entry(id).space[name] for id in ids if name in entry(id).space]
-        units = dict.fromkeys(each.unit for each in ranges) or [gain.unit]
-        within = dict.fromkeys(f"{each.low:g} to {each.high:g}" for each in ranges)
+        units = dict.fromkeys(bounds.unit for bounds in ranges) or [gain.unit]
+        within = dict.fromkeys(f"{bounds.low:g} to {bounds.high:g}" for bounds in ranges)
         numbers = (f"{values[id][name]:.4g}" for id in names)
         lines.append(row(f"`{name}`", gain.meaning, "; ".join(units), "; ".join(within), *numbers))
     return "\n".join(lines)
@@ -86,7 +86,7 @@ def scores(ids):
     ]
     for id in ids:
         rows = [board.suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(error.mean) for error in each.errors.values()) for each in rows]
+        cells = [" / ".join(mm(error.mean) for error in score.errors.values()) for score in rows]
         variation = rows[0].metrics["thrust_variation"].mean
         lines.append(row(f"`{id}`", *cells, in_figures(variation)))
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""`usm bench`: speed, against peers, in one run."""
+"""`usm bench`: measure speed against peers in one run."""
 
 from __future__ import annotations
 
@@ -27,10 +27,9 @@ from usm_gym.support.text import figures
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Measure speed on this machine, every figure against its peer in the same run: they take turns, round
-by round, and medians with smallest and largest value are printed. Peers that are not
-installed (the extra `bench`) are reported as missing. Takes two minutes; let the machine do nothing
-else meanwhile.
+Measure the speed on this machine. Figures and their peers are measured in the same run, in turns,
+round by round. Prints medians with the smallest and largest values, and names the peers that are
+not installed (extra `bench`). Takes two minutes; let the machine do nothing else meanwhile.
 """
 
 PEERS = {
@@ -72,8 +71,12 @@ def add_to(subparsers: Any) -> None:
         help="measure speed against peers",
         description=DESCRIPTION,
     )
-    parser.add_argument("--rounds", type=int, default=15, metavar="N", help="default: 15")
-    parser.add_argument("--growth", action="store_true", help="also links 4-64, robots 1-4096")
+    parser.add_argument(
+        "--rounds", type=int, default=15, metavar="N", help="rounds of measurements (default: 15)"
+    )
+    parser.add_argument(
+        "--growth", action="store_true", help="also measure 4 to 64 links and 1 to 4096 robots"
+    )
     parser.add_argument("--output", metavar="FILE", help="write the figures as JSON")
     parser.set_defaults(run=run)
 
@@ -116,7 +119,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def available() -> tuple[list[Timing], list[str]]:
-    """What can be timed here, and the names of what lacks a package."""
+    """The timings that can run here, and the names of those that lack a package."""
     makers: dict[str, Callable[[str], Timing]] = {
         "plant_step_ns": lambda name: benchmark.plant_timing(name, 1, SINGLE_PERIOD),
         "batch_step_ns": lambda name: benchmark.plant_timing(name, ROBOTS, BATCH_PERIOD),
@@ -140,7 +143,7 @@ def available() -> tuple[list[Timing], list[str]]:
 
 
 def whole_jobs() -> dict[str, tuple[Callable[[], float], int]]:
-    """Jobs that are timed as a whole, and how often."""
+    """Jobs that are timed as a whole, with their numbers of repetitions."""
     benchmark.paper_rate()  # compiles what is not yet compiled
     return {
         "paper_rate_40s_s": (lambda: benchmark.timed(benchmark.paper_rate), 3),
@@ -164,7 +167,7 @@ def table(measured: dict[str, Figure], missing: list[str]) -> Table:
 
 
 def growth_table(rows: list[Growth]) -> Table:
-    """How the cost grows."""
+    """The growth of the cost, for the terminal."""
     headings = ("links", "robots", "threads", "ns per robot and step", "ns per link")
     table = empty_table(numbers=headings)
     for row in rows:

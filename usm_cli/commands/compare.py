@@ -1,4 +1,4 @@
-"""`usm compare`: is one policy better than another?"""
+"""`usm compare`: decide whether one policy is better than another."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import OtherScenario
 
 DESCRIPTION = """\
-Compare two policies episode by episode, on the same scenarios and noise. Printed are the mean
-difference of the largest position error (B - A) with its 95 % bootstrap interval, the probability
-that B does better in an episode, and whether the data decide. A and B are policies, or results that
-`usm evaluate --output` has written: FILE.json, or FILE.json:POLICY where it has several.
+Compare two policies episode by episode, on the same scenarios and noise. Prints the mean
+difference of the largest position errors (B - A) with its 95 % bootstrap interval, the probability
+that B does better in an episode, and whether the data decide. A and B are policies or results from
+`usm evaluate --output`: FILE.json, or FILE.json:POLICY if the file has several policies.
 """
 EXAMPLES = f"""\
 {POLICIES}
 examples:
-  usm compare pd sta                                both are evaluated on the operation suite
+  usm compare pd sta                                evaluates both on the operation suite
   usm compare sta sta@sta.json --seed 1 --episodes 200
-  usm compare results.json:sta results.json:pd      nothing is evaluated
-  usm compare results.json:sta my_module:Mine       evaluated on the scenarios of the file
+  usm compare results.json:sta results.json:pd      evaluates nothing
+  usm compare results.json:sta my_module:Mine       evaluates Mine on the scenarios of the file
 """
 Scores = Mapping[str, Sequence[float]]
 
@@ -69,8 +69,8 @@ def add_to(subparsers: Any) -> None:
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
-    parser.add_argument("first", metavar="A", help="policy, or file of results")
-    parser.add_argument("second", metavar="B", help="policy, or file of results")
+    parser.add_argument("first", metavar="A", help="policy or file of results")
+    parser.add_argument("second", metavar="B", help="policy or file of results")
     add_scenarios(parser)
     add_scoring(parser)
     parser.add_argument("--output", metavar="FILE", help="write the comparison as JSON")
@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output:
         check_writable(arguments.output)
     names = (arguments.first, arguments.second)
-    require(names[0] != names[1], "B", names[1], "another than A")
+    require(names[0] != names[1], "B", names[1], "another policy than A")
     files = {name: read_results(name) for name in names if is_results(name)}
     missing = [named(name) for name in names if name not in files]
     scenarios: Sequence[Scenario | OtherScenario]
@@ -91,10 +91,10 @@ def run(arguments: argparse.Namespace) -> None:
     known = not missing or len(planar) == len(scenarios)
     require(known, "policies", names, "two results, as these scenarios are of another world")
     chosen = jobs(missing, planar, arguments.time_limit) if missing else []
-    scores = {name: file.scores for name, file in files.items()}
+    scores = {name: part.scores for name, part in files.items()}
     evaluated, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
-    scores |= {name: errors_of(score.per_episode) for name, score in evaluated.items()}
+    scores |= {name: errors_of(evaluation.per_episode) for name, evaluation in evaluated.items()}
     first, second = (scores[name] for name in names)
     require(list(first) == list(second), "B", names[1], "a policy on the axes of A")
     compared = {name: compare(first[name], second[name]) for name in first}
@@ -102,9 +102,7 @@ def run(arguments: argparse.Namespace) -> None:
         first=names[0],
         second=names[1],
         episodes=len(scenarios),
-        comparisons={
-            name: Difference.of(comparison, *names) for name, comparison in compared.items()
-        },
+        comparisons={name: Difference.of(pair, *names) for name, pair in compared.items()},
         provenance=Provenance.here({"files": list(files)} if files else seeds(arguments)),
     )
     console = output_console()
@@ -118,22 +116,22 @@ def run(arguments: argparse.Namespace) -> None:
 def common_scenarios(
     arguments: argparse.Namespace, names: Sequence[str], files: Mapping[str, PolicyScores]
 ) -> list[Scenario | OtherScenario]:
-    """The scenarios of files, which have to be the same."""
+    """The common scenarios of the files; refuse files with different ones."""
     options = ("suite", "seed", "episodes", "mode", "conditions")
     given = [f"--{name}" for name in options if getattr(arguments, name) is not None]
     require(not given, " ".join(given), names, "policies only: a file has its own scenarios")
-    scenarios, *others = [file.scenarios for file in files.values()]
+    scenarios, *others = [part.scenarios for part in files.values()]
     require(all(other == scenarios for other in others), "B", names[1], "the scenarios of A")
     return scenarios
 
 
 def is_results(name: str) -> bool:
-    """Whether a name is that of a file of results."""
+    """Whether a name names a file of results."""
     return "@" not in name and name.partition(":")[0].endswith(".json")
 
 
 def read_results(name: str) -> PolicyScores:
-    """Read FILE.json or FILE.json:POLICY, as `usm evaluate` has written it."""
+    """Read FILE.json or FILE.json:POLICY from `usm evaluate`."""
     path, _, policy = name.partition(":")
     result = EvaluationResult.read(path)
     several = ", ".join(f"{path}:{id}" for id in result.results) or "a file with scores"
@@ -150,7 +148,7 @@ def errors_of(per_episode: Mapping[str, Any]) -> Scores:
 
 
 def sentence(axis: str, difference: Difference, first: str, second: str) -> str:
-    """A difference in words."""
+    """Describe a difference in one sentence."""
     low, high = difference.difference_ci95
     least, most = difference.improvement_ci95
     return (

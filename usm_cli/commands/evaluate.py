@@ -28,10 +28,11 @@ from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures, mm
 
 DESCRIPTION = """\
-Score policies: per episode and axis, the largest true position error after settling (5 s), as in
-Table 1 of the paper. All policies meet the same scenarios and the same noise. Printed are means
-over episodes with 95 % bootstrap intervals; a lost robot counts 0.5 m or more in both axes. A
-policy that fails to act is left out of the table, with the reason on a line of its own, status 1.
+Score policies. The score of an episode is the largest true position error after settling (5 s), in
+each axis, as in Table 1 of the paper. All policies meet the same scenarios and the same noise.
+Prints means over episodes with 95 % bootstrap intervals; a lost robot counts 0.5 m or more in both
+axes. A policy that fails to act is left out of the table and named with the reason; the exit status
+is then 1.
 """
 EXAMPLES = f"""\
 {POLICIES}
@@ -40,10 +41,10 @@ examples:
   usm evaluate --policies sta,pd --suite torpedo        two of them in torpedo mode
   usm evaluate --policies sta --seed 7 --episodes 200   sampled scenarios
   usm evaluate --conditions ideal                       the suite without noise, lag and current
-  usm evaluate --conditions '{{"position_noise": 0}}'     one field other than in "field"
-  usm evaluate --policies sta --output sta.json         keep everything, episode by episode
-  usm evaluate --policies sta,sta@gains.json            gains of one's own, see usm tune
-  usm evaluate --policies sta,my_module:MyController    a controller of one's own
+  usm evaluate --conditions '{{"position_noise": 0}}'     "field" with one field changed
+  usm evaluate --policies sta --output sta.json         keep the scores of every episode
+  usm evaluate --policies sta,sta@gains.json            your own gains, see usm tune
+  usm evaluate --policies sta,my_module:MyController    your own controller
 """
 
 
@@ -78,8 +79,8 @@ def run(arguments: argparse.Namespace) -> None:
         episodes=len(scenarios),
         scenarios=tuple(scenarios),
         results={
-            name: CompetitorScores.of(score.summary(), competitor=name not in privileged)
-            for name, score in scores.items()
+            name: CompetitorScores.of(evaluation.summary(), competitor=name not in privileged)
+            for name, evaluation in scores.items()
         },
         refused=refused,
         provenance=Provenance.here(seeds(arguments)),

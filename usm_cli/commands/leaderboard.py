@@ -1,4 +1,4 @@
-"""`usm leaderboard`: every policy on every frozen suite."""
+"""`usm leaderboard`: score every policy on every frozen suite."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from usm_gym.support.validation import require
 DESCRIPTION = """\
 Score every policy on every frozen suite, and on the operation suite with the joints still. Writes
 leaderboard.json, leaderboard.csv, leaderboard.md and three figures (extra `render`) into a folder.
-An interrupted run resumes when started again: a policy's scores on a suite are kept in the folder
-`cache` there, for as long as nothing that they depend on changes.
+After an interruption, run it again to continue: the folder `cache` there keeps the scores of a
+policy on a suite until something changes on which they depend.
 """
 EXAMPLES = f"""\
 {POLICIES}
 examples:
   usm leaderboard --workers 2                          into results/VERSION
-  usm leaderboard --insert README.md                   and a short table between the marks there
+  usm leaderboard --insert README.md                   also a short table between its marks
   usm leaderboard --policies sta,my_module:MyController --output mine
 """
 
@@ -49,14 +49,14 @@ def add_to(subparsers: Any) -> None:
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
-    add_policies(parser, default="all, also slow and privileged ones")
+    add_policies(parser, default="all, including slow and privileged ones")
     add_scoring(parser)
     add = parser.add_argument
     add("--output", metavar="DIR", help="folder (default: results/VERSION)")
     add(
         "--insert",
         metavar="FILE",
-        help="page in which to renew the short table of the operation suite",
+        help="page in which to update the short table of the operation suite",
     )
     parser.set_defaults(run=run)
 
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> None:
         outcomes = scored([place.job for place in chosen], arguments, folder / "cache")
         pairs = list(zip(chosen, outcomes, strict=True))
         acts = any(p.suite == MAIN and isinstance(outcome, Evaluation) for p, outcome in pairs)
-        require(acts, "--policies", arguments.policies, "one that acts, at least")
+        require(acts, "--policies", arguments.policies, "at least one policy that acts")
         origin = Provenance.here({"suites": list(NAMES)})
         result = leaderboard(pairs, fronts, version("usm-gym"), origin)
         result.write(folder / "leaderboard.json")

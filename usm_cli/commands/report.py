@@ -1,4 +1,4 @@
-"""`usm report`: results as a page."""
+"""`usm report`: turn results into a page."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from usm_gym.support.files import check_writable, write_text
 from usm_gym.support.provenance import provenance
 
 DESCRIPTION = """\
-Show results as one page of HTML that needs nothing but itself: sortable tables with intervals, an
-episode of every policy to be played, its errors over time, error against thrust variation or
-against the quantity that was varied, conditions and provenance. Results are what `usm evaluate`,
-`usm leaderboard`, `usm robustness` and `usm reproduce` leave as JSON. Needs the extra `report`.
+Turn results into one self-contained page of HTML: sortable tables with intervals, a replay of an
+episode of every policy, errors over time, error against thrust variation or against the varied
+quantity, conditions and provenance. The results are the JSON files of `usm evaluate`, `usm
+leaderboard`, `usm robustness`, `usm reproduce` and `usm study`. Needs the extra `report`.
 """
 EXAMPLES = f"""\
 {POLICIES}
@@ -34,7 +34,7 @@ def add_to(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "report",
-        help="results as a page with replays",
+        help="turn results into a page with replays",
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
@@ -44,9 +44,9 @@ def add_to(subparsers: Any) -> None:
     add(
         "--policies",
         metavar="A,B",
-        help="which to replay (default: those of the result, but no code of your own)",
+        help="policies to replay (default: the registered ones of the result)",
     )
-    add("--scenario", type=int, metavar="I", help="which episode to replay, from 0 on (default: 0)")
+    add("--scenario", type=int, metavar="I", help="episode to replay, from 0 (default: 0)")
     add_computing(parser)
     parser.set_defaults(run=run)
 
@@ -54,7 +54,7 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Replay, write the page."""
     check_installed("usm report", "report", "jinja2")
-    # These need the extra.
+    # These imports need the extra.
     from usm_cli.report.chapters import Choice, chapter, read
     from usm_cli.report.page import html
 
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> None:
     contenders = None if arguments.policies is None else chosen_contenders(arguments.policies)
     scenario = count(arguments, "scenario", 0, least=0)
     files = [Path(name) for name in arguments.results]
-    results = {file: read(file) for file in files}  # before anything is computed
+    results = {file: read(file) for file in files}  # before any computation
     chapters = []
     with computing(arguments) as workers, progress_bar() as bar:
         choice = Choice(contenders, scenario, workers)
@@ -76,5 +76,5 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def advance(bar: Progress, line: TaskID, done: int, total: int) -> None:
-    """Say on a line of the progress bar how many episodes are done."""
+    """Update a line of the progress bar."""
     bar.update(line, completed=done, total=total)

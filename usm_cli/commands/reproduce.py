@@ -1,4 +1,4 @@
-"""`usm reproduce`: the paper's Table 1 and figures, and what depends on its open items."""
+"""`usm reproduce`: regenerate the paper's Table 1 and figures, and study its open items."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ if TYPE_CHECKING:  # its import takes time
     from usm_baselines.paper.reproduction_fit import FitResult
 
 DESCRIPTION = """\
-Run the paper as printed: explicit laws and observer at a step of 1e-5 s, ideal thrusters without
-limit, its gains, on the declared scenario `table1`; print our Table 1 beside the paper's. With
---output, also write table1.json, table1.md and the figures into a folder (the figures need the
-extra `render`). Takes less than a minute on two cores.
+Run the paper as printed, with explicit laws and observer at a step of 1e-5 s, ideal thrusters
+without limit and the paper's gains, on the declared scenario `table1`. Prints our Table 1 beside
+the paper's. With --output, also writes table1.json, table1.md and the figures into a folder (extra
+`render`). Takes less than a minute on two cores.
 
---study and --fit write into the same folder, take some minutes, and go on where they stopped when
-they are started again.
+--study and --fit write into the same folder and take some minutes. After an interruption, run them
+again to continue.
 """
 EXAMPLES = """\
 examples:
   usm reproduce                                    the table
   usm reproduce --output paper                     the table and all figures
   usm reproduce --output paper --figures fig05,fig07
-  usm reproduce --step 1e-4                        at another step
-  usm reproduce --output paper --study             every open item one at a time
+  usm reproduce --step 1e-4                        another step
+  usm reproduce --output paper --study             vary the open items one at a time
   usm reproduce --output paper --fit               refit the declared scenario
 """
 GENERATIONS = 60
@@ -62,11 +62,11 @@ def add_to(subparsers: Any) -> None:
     )
     add = parser.add_argument
     add("--output", metavar="DIR", help="folder for the table and the figures")
-    add("--figures", metavar="A,B", help=f"which figures ({', '.join(NAMES)}; default: all)")
+    add("--figures", metavar="A,B", help=f"figures to draw ({', '.join(NAMES)}; default: all)")
     add("--step", type=float, default=STEP, metavar="S", help="step, s (default: 1e-5)")
     other = parser.add_mutually_exclusive_group()
     other.add_argument("--study", action="store_true", help="vary every open item instead")
-    other.add_argument("--fit", action="store_true", help="refit the declaration instead")
+    other.add_argument("--fit", action="store_true", help="refit the declared scenario instead")
     parser.set_defaults(run=run)
 
 
@@ -119,7 +119,7 @@ def run_study(folder: Path) -> None:
 
 
 def run_fit(folder: Path) -> None:
-    """Refit the declaration, write fit.json, print what came of it."""
+    """Refit the declared scenario, write fit.json, print the fit."""
     from usm_baselines.paper.reproduction_fit import fit
 
     with progress_bar() as bar:
@@ -139,7 +139,7 @@ def workers() -> int:
 
 
 def chosen_figures(text: str | None) -> list[str]:
-    """The figures that the argument asks for."""
+    """The figures that the argument names."""
     if text is None:
         return list(NAMES)
     chosen = [name.strip() for name in text.split(",") if name.strip()]
@@ -148,7 +148,7 @@ def chosen_figures(text: str | None) -> list[str]:
 
 
 def check_step(step: float) -> None:
-    """Refuse a step at which the records' instants would be missed."""
+    """Refuse a step that does not meet the instants of the records."""
     count = SAMPLE_TIME / step if step > 0 else 0.0
     require(
         1.0 <= count < math.inf and abs(count - round(count)) < 1e-6 * count,
@@ -159,12 +159,12 @@ def check_step(step: float) -> None:
 
 
 def columns(result: ReproductionResult) -> list[tuple[str, str]]:
-    """The columns of the table: every part with every axis."""
+    """The columns of the table, as pairs of part and axis."""
     return [(part, axis) for part in PARTS for axis in result.axes]
 
 
 def lines(result: ReproductionResult) -> list[list[str]]:
-    """Our rows and the paper's, mm, with the ratio of ours to the paper's, as text."""
+    """Our rows, the paper's and their ratio, mm, as text."""
     places = columns(result)
     listed = []
     for name, row in result.rows.items():
@@ -190,20 +190,23 @@ def terminal_table(result: ReproductionResult) -> Table:
 
 
 def fit_table(result: FitResult) -> Table:
-    """The numbers that the fit saw, and its freedoms, for the terminal."""
+    """The fitted numbers and the free parameters, for the terminal."""
     shown = empty_table(
         "",
         numbers=("declared", "fitted"),
-        title="ours over the paper's at a step of 1e-5 s, and what was free",
+        title="ours over the paper's at a step of 1e-5 s, and the free parameters",
     )
     candidates = (result.declared, result.fitted)
     for part, printed in result.seen.items():
         for index, axis in enumerate(AXES):
-            made = [candidate.paper.numbers[part][index] for candidate in candidates]
-            shown.add_row(f"{part} {axis}", *(figures(error / printed[index]) for error in made))
-    shown.add_row("residual", *(figures(candidate.paper.residual) for candidate in candidates))
+            errors = [candidate.paper.numbers[part][index] for candidate in candidates]
+            ratios = [error / printed[index] for error in errors]
+            shown.add_row(f"{part} {axis}", *map(figures, ratios))
+    residuals = [candidate.paper.residual for candidate in candidates]
+    shown.add_row("residual", *map(figures, residuals))
     for freedom in result.freedom:
-        shown.add_row(freedom, *(figures(candidate.freedoms[freedom]) for candidate in candidates))
+        values = [candidate.freedoms[freedom] for candidate in candidates]
+        shown.add_row(freedom, *map(figures, values))
     return shown
 
 

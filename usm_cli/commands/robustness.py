@@ -1,4 +1,4 @@
-"""`usm robustness`: error against one quantity."""
+"""`usm robustness`: vary one quantity and score policies."""
 
 from __future__ import annotations
 
@@ -33,13 +33,14 @@ from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Vary one quantity of a suite, all else being equal, and score policies at every value of it. They
-keep the nominal knowledge of the suite, but always know the control period. Writes QUANTITY.json
-and QUANTITY.png (extra `render`) into a folder; an interrupted run resumes when started again.
+Vary one quantity of a suite, with all else equal, and score policies at every value. The policies
+keep the nominal knowledge of the suite; they always know the true control period. Writes
+QUANTITY.json and QUANTITY.png (extra `render`) into a folder. After an interruption, run it again
+to continue.
 """
 EXAMPLES = f"""\
 quantities:
-{"".join(f"  {name:<12}{quantity.label}{chr(10)}" for name, quantity in QUANTITIES.items())}
+{"".join(f"  {name:<12}{known.label}{chr(10)}" for name, known in QUANTITIES.items())}
 {POLICIES}
 examples:
   usm robustness --vary noise --policies sta,pd
@@ -56,8 +57,8 @@ def add_to(subparsers: Any) -> None:
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("--vary", choices=list(QUANTITIES), required=True, metavar="QUANTITY", help="which")
-    add("--values", metavar="V,W", help="at which values (default: some over a wide range)")
+    add("--vary", choices=list(QUANTITIES), required=True, metavar="QUANTITY", help="see below")
+    add("--values", metavar="V,W", help="its values (default: some over a wide range)")
     add_policies(parser)
     add_scenarios(parser)
     add_scoring(parser)
@@ -71,7 +72,7 @@ def run(arguments: argparse.Namespace) -> None:
     values = quantity.values if arguments.values is None else parse_values(arguments.values)
     scenarios = chosen_scenarios(arguments)
     contenders = chosen_contenders(arguments.policies)
-    jobs(contenders, scenarios, arguments.time_limit)  # refuses what cannot be made
+    jobs(contenders, scenarios, arguments.time_limit)  # refuses policies that cannot be made
     chosen = robustness.jobs(contenders, scenarios, quantity, values, arguments.time_limit)
     folder = output_folder(arguments.output)
     outcomes = scored(chosen, arguments, folder / "cache")
@@ -91,12 +92,12 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def parse_values(text: str) -> tuple[float, ...]:
-    """Numbers, by commas."""
+    """Read numbers, separated by commas."""
     try:
-        values = tuple(float(value) for value in text.split(","))
+        values = tuple(map(float, text.split(",")))
     except ValueError:
         values = ()
-    require(values, "--values", text, "numbers, by commas")
+    require(values, "--values", text, "numbers, separated by commas")
     return values
 
 
@@ -114,7 +115,7 @@ def table(result: RobustnessResult) -> Table:
 
 
 def cell(point: ScoredPoint | RefusedPoint) -> str:
-    """The errors at one value."""
+    """Write the errors at one value."""
     if isinstance(point, RefusedPoint):
         return "refused"
     return " / ".join(mm(error.mean) for error in point.errors.values())

@@ -15,18 +15,19 @@ from usm_gym.support.results import Provenance
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Train the agents that are shipped, and others that lack one thing each, under several seeds; score
-them and the classical policies on unseen scenarios, at home and elsewhere; and look at what the
-agents do to their bases. Writes study.json, study.md and figures (extra `render`) into a folder,
-and each training into a folder of its own in `runs` there. An interrupted study resumes when
-started again, even in the middle of a training: its checkpoint, which is code, is run if its plan
-is that of the study, so give --output a folder of your own. A folder that holds another training,
-or parts of one without its plan, is refused. Takes hours on two cores. Needs the extra `agents`.
+Train the shipped agents, and ablations that lack one thing, with several seeds. Score them and the
+classical policies on unseen scenarios, under the training conditions and under others, and examine
+what the agents do to their bases. Writes study.json, study.md and figures (extra `render`) into a
+folder, and the trainings into the folder `runs` there. After an interruption, run it again to
+continue, even in the middle of a training. This runs the training's checkpoint, which is code, if
+its plan is the study's, so give --output only a folder of your own. A folder that holds another
+training, or parts of one without its plan, is refused. Takes hours on two cores. Needs the extra
+`agents`.
 """
 EXAMPLES = """\
 examples:
   usm study residual --workers 2                             all of it
-  usm study residual --only residual-ppo,rl-only --seeds 2   two agents under two seeds
+  usm study residual --only residual-ppo,rl-only --seeds 2   two agents with two seeds
   usm study residual --only reference,scale-3 --steps 20000 --output try
 """
 
@@ -40,17 +41,17 @@ def add_to(subparsers: Any) -> None:
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("subject", choices=["residual"], help="what is studied")
+    add("subject", choices=["residual"], help="what to study")
     add("--only", metavar="A,B", help="some agents and ablations, by name (default: all)")
-    add("--seeds", type=int, default=5, metavar="N", help="seeds per agent, at most (default: 5)")
-    add("--steps", type=int, metavar="N", help="steps per training (default: its own)")
+    add("--seeds", type=int, default=5, metavar="N", help="largest number of seeds (default: 5)")
+    add("--steps", type=int, metavar="N", help="steps of a training (default: as planned)")
     add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
     add_computing(parser)
     add("--output", default="results/study", metavar="DIR", help="default: results/study")
     add(
         "--ship",
         metavar="DIR",
-        help="put every agent, as its seed 0, into a folder of its own there",
+        help="write the agents, with seed 0, into folders there",
     )
     parser.set_defaults(run=run)
 

@@ -15,19 +15,20 @@ from usm_gym.task.metrics import MAX_ERROR, axes_of
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
 --policies takes, its learning curve on held-out scenarios of the training distribution, logs for
-TensorBoard, and the last checkpoint. Frozen suites are never seen. `usm train --resume --output
-DIR` continues from the last checkpoint, and ends as if it had never been interrupted. A checkpoint
-is code, and resuming runs it: do so only where you trained yourself. Without --resume a folder that
-holds any file of a training is refused, and nothing in it is opened. Needs the extra `agents`.
+TensorBoard, and the last checkpoint. Training never uses frozen suites. `usm train --resume
+--output DIR` continues from the last checkpoint and ends as if it had never been interrupted. A
+checkpoint is code, and resuming runs it, so resume only your own trainings. Without --resume, a
+folder that holds any part of a training is refused, and nothing in it is opened. Needs the extra
+`agents`.
 """
 EXAMPLES = """\
 examples:
   usm train --output mine                             PPO on the paper's controller
   usm train --algorithm tqc --base pd --output mine   another algorithm on another base
-  usm train --resume --output mine                    go on after an interruption
-  usm evaluate --policies sta,mine                    what training gains
+  usm train --resume --output mine                    continue after an interruption
+  usm evaluate --policies sta,mine                    score the agent
 """
-# Options that make the plan, by the names of its fields.
+# The options of the plan, by the names of its fields.
 OPTIONS = (
     ("algorithm", str, "A", "ppo, recurrent-ppo, sac, td3 or tqc (default: ppo)"),
     ("env", str, "ID", "residual task (default: usm_agents:USM-OperationResidual-v0)"),
@@ -35,7 +36,7 @@ OPTIONS = (
     ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),
     ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
     ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
-    ("seed", int, "S", "seed of everything random (default: 0)"),
+    ("seed", int, "S", "seed of all random numbers (default: 0)"),
     ("steps", int, "N", "steps of all robots together (default: 3000000)"),
     ("interval", int, "N", "steps between checkpoints (default: 250000)"),
 )
@@ -52,19 +53,19 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     for name, kind, metavar, text in OPTIONS:
         add(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
-    add("--omit", metavar="A,B", help="entries of the observation that the agent is not shown")
+    add("--omit", metavar="A,B", help="entries of the observation to hide from the agent")
     add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
     add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
     add(
         "--resume",
         action="store_true",
-        help="go on from the last checkpoint there, which is code that is run: only from your own",
+        help="continue from the last checkpoint there; this runs code, so resume only your own",
     )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Train, with a progress bar, and say what came of it."""
+    """Train with a progress bar, and print the result."""
     folder = Path(arguments.output)
     check_installed("usm train", "agents", "sb3_contrib")
     from usm_agents.learning.plan import Plan, read_plan
@@ -79,7 +80,9 @@ def run(arguments: argparse.Namespace) -> None:
     if "conditions" in given:
         given["conditions"] = parse_conditions(given["conditions"])
     if arguments.resume:
-        require(not given, "--resume", ", ".join(given), "--output alone; the rest is kept there")
+        require(
+            not given, "--resume", ", ".join(given), "--output alone; the plan is in that folder"
+        )
         plan = read_plan(folder)
     else:
         plan = Plan(**given)

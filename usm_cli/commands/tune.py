@@ -1,4 +1,4 @@
-"""`usm tune`: look for better gains of a policy."""
+"""`usm tune`: search for better gains of a policy."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from usm_gym.task.conditions import FIELD
 from usm_gym.task.scenario import MODES
 
 DESCRIPTION = """\
-Look for the gains of a policy with the smallest objective: the mean of the largest errors of all
-axes, added up, in mm, plus a weight times the thrust variation. Scenarios are sampled for tuning
-alone: no frozen suite is ever seen. An interrupted tuning resumes when the same command is given
-again, and its result is the same for any number of workers. Needs the extra `tune`.
+Search for the gains of a policy with the smallest objective: the mean of the largest errors, summed
+over the axes, in mm, plus a weight times the thrust variation. Scenarios are sampled for tuning
+only; tuning never uses a frozen suite. After an interruption, run the same command again to
+continue. The result is the same for any number of workers. Needs the extra `tune`.
 """
 EXAMPLES = """\
 examples:
   usm tune sta                                      writes sta.json, trials in sta.db
   usm tune sta --trials 50 --workers 2              a quick look
-  usm tune sta --weight 0.01 --output calm.json     less chattering for more error
-  usm evaluate --policies sta,sta@sta.json          what tuning gains
+  usm tune sta --weight 0.01 --output calm.json     less chattering, more error
+  usm evaluate --policies sta,sta@sta.json          score the new gains
 """
 
 
@@ -36,26 +36,26 @@ def add_to(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "tune",
-        help="look for better gains",
+        help="search for better gains",
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("policy", metavar="POLICY", help="id of a policy that declares a space of gains")
+    add("policy", metavar="POLICY", help="id of a policy that declares ranges of gains")
     add("--trials", type=int, metavar="N", help="sets of gains to try (default: 300)")
     add("--episodes", type=int, metavar="N", help="scenarios per set (default: 50)")
     add("--weight", type=float, metavar="W", help="mm per N/s of variation (default: 0.002)")
     add("--mode", choices=MODES, default="operation", help="default: operation")
     add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
-    add("--seed", type=int, metavar="S", help="of scenarios and search (default: 0)")
-    add("--output", metavar="FILE", help="gains and provenance (default: POLICY.json)")
+    add("--seed", type=int, metavar="S", help="seed of scenarios and search (default: 0)")
+    add("--output", metavar="FILE", help="file of gains and provenance (default: POLICY.json)")
     add("--storage", metavar="URL", help="Optuna's storage (default: SQLite, beside the output)")
     add_computing(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Tune, write the gains, print what they are worth."""
+    """Tune, write the gains, print their scores."""
     check_installed("usm tune", "tune", "optuna")
     from usm_baselines.benchmark.tuning import VARIATION_WEIGHT, Problem, tune
 
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> None:
             "weight": problem.weight,
             "mode": problem.mode,
             "conditions": asdict(problem.conditions),
-            "space": {name: asdict(span) for name, span in problem.space.items()},
+            "space": {name: asdict(bounds) for name, bounds in problem.space.items()},
             "provenance": provenance({"seed": problem.seed}),
         }
         write_json(output, document)

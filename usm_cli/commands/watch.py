@@ -1,4 +1,4 @@
-"""`usm watch`: policies at work."""
+"""`usm watch`: show policies in a window or a film."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from usm_gym.support.validation import require
 from usm_gym.task.metrics import MAX_ERROR, axes_of
 
 DESCRIPTION = """\
-Watch a policy in an episode, or two side by side on the same scenario and noise, in a window
-(Escape closes it) or in a file. Shown are the robot and the posture it shall have, the jets of its
-thrusters, the track of its centre of mass, and its error, magnified and against time. Needs the
-extra `render`.
+Watch a policy in an episode, or two side by side in the same scenario with the same noise, in a
+window (Escape closes it) or in a film. The picture shows the robot and its reference posture, the
+jets of its thrusters, the track of its centre of mass, and its error, magnified and over time.
+Needs the extra `render`.
 """
 EXAMPLES = f"""\
 {POLICIES}
@@ -37,7 +37,7 @@ examples:
   usm watch --policies pd,sta                   two policies side by side
   usm watch --policies sta --output run.mp4     a film; run.gif for a page that shows no films
   usm watch --suite torpedo --scenario 7        another episode
-  usm watch --seed 3 --speed 4                  a sampled one, four times as fast
+  usm watch --seed 3 --speed 4                  a sampled episode at four times real time
 """
 
 
@@ -45,14 +45,20 @@ def add_to(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "watch",
-        help="see policies at work, in a window or a film",
+        help="show policies in a window or a film",
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
     add_policies(parser, default="sta")
     add_scenarios(parser, single=True)
     add = parser.add_argument
-    add("--speed", type=float, default=1.0, metavar="X", help="times real time (default: 1)")
+    add(
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="speed of the film, times real time (default: 1)",
+    )
     add("--output", metavar="FILE", help="write a film, .mp4 or .gif, instead of showing it")
     parser.set_defaults(run=run)
 
@@ -60,7 +66,7 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Simulate, then write or show, then print the scores."""
     check_installed("usm watch", "render", "pygame", "matplotlib", "imageio_ffmpeg")
-    # These need the extra.
+    # These imports need the extra.
     from usm_cli import film
     from usm_gym.rendering.window import has_display
 
@@ -72,7 +78,7 @@ def run(arguments: argparse.Namespace) -> None:
         require(medium in film.FPS, "--output", arguments.output, "a file .mp4 or .gif")
         check_writable(path)
     else:
-        require(has_display(), "--output", None, "a file .mp4 or .gif, for there is no display")
+        require(has_display(), "--output", None, "a file .mp4 or .gif, since there is no display")
     contenders = chosen_contenders(arguments.policies or "sta")
     require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
     scenario = chosen_scenario(arguments)
@@ -81,8 +87,8 @@ def run(arguments: argparse.Namespace) -> None:
     with progress_bar() as bar:
         line = bar.add_task("simulate", total=len(contenders))
         takes = [
-            take(policy, scenario, shown, lambda episodes: bar.advance(line, episodes))
-            for policy in contenders
+            take(contender, scenario, shown, lambda episodes: bar.advance(line, episodes))
+            for contender in contenders
         ]
         made = film.Film(takes, len(shown), film.WIDTHS[medium][len(takes) - 1])
         if path:

@@ -1,4 +1,4 @@
-"""What a page is made of, as plain data, drawn by one template per kind of block."""
+"""The blocks of a page, as plain data; the template of a block draws it."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class Cell:
     """A cell of a table.
 
     Attributes:
-        text: What is written.
-        value: What rows are sorted by.
-        detail: Written smaller behind it, such as an interval.
-        marks: Intervals to be drawn in place of the text, by their axis.
+        text: The text.
+        value: The value by which rows are sorted.
+        detail: Smaller text behind it, such as an interval.
+        marks: Intervals to draw instead of the text, by axis.
         alarm: Whether it is bad news.
     """
 
@@ -48,9 +48,9 @@ class Column:
     """A column of a table.
 
     Attributes:
-        title: What it holds, with the unit.
-        ticks: Labels of the scale on which marks are drawn, and where, per cent of the width.
-        marked: The axes whose marks it has, in order.
+        title: Its content, with the unit.
+        ticks: Labels of the scale of the marks and their places, per cent of the width.
+        marked: The axes of its marks, in order.
     """
 
     title: str
@@ -69,12 +69,12 @@ class SortableTable:
 
 @dataclass(frozen=True)
 class Tables:
-    """Tables of the same kind, one of them shown at a time.
+    """Tables of the same kind, one of which is visible at a time.
 
     Attributes:
         title: Heading.
-        lead: What there is to see, in a sentence or two.
-        label: What they differ in.
+        lead: What they show, in a sentence or two.
+        label: What distinguishes them.
         tables: The tables by name.
     """
 
@@ -91,9 +91,9 @@ class Plot:
 
     Attributes:
         title: Heading.
-        lead: What there is to see.
-        data: What `plots.js` draws: `kind` ("points" or "curves"), `x` (`label`, `log`), `y`
-            (`log`), and `panels`, which have `label` and `points`, `lines` or `series`.
+        lead: What they show.
+        data: The data that `plots.js` draws: `kind` ("points" or "curves"), `x` (`label`, `log`),
+            `y` (`log`), and `panels` with `label` and `points`, `lines` or `series`.
     """
 
     template: ClassVar[str] = "plot.html"
@@ -104,14 +104,14 @@ class Plot:
 
 @dataclass(frozen=True)
 class Replay:
-    """An episode of several policies, to be played.
+    """A replay of an episode of several policies.
 
     Attributes:
         title: Heading.
         lead: The scenario in words.
-        data: What `replay.js` plays (`usm_cli.report.replay`).
-        first: The two policies that are shown at first.
-        notes: What to know about the replay.
+        data: The data that `replay.js` plays (`usm_cli.report.replay`).
+        first: The two policies that the page shows first.
+        notes: Remarks on the replay.
     """
 
     template: ClassVar[str] = "replay.html"
@@ -124,7 +124,7 @@ class Replay:
 
 @dataclass(frozen=True)
 class Facts:
-    """Terms and what they are."""
+    """Terms and their explanations."""
 
     template: ClassVar[str] = "facts.html"
     title: str
@@ -133,14 +133,14 @@ class Facts:
 
 @dataclass(frozen=True)
 class Chapter:
-    """All of one result.
+    """Everything about one result.
 
     Attributes:
         title: Heading.
-        lead: What it is, in a sentence.
-        motion: What the joint motion does to the error, if the result tells; for the page's head.
-        verdict: Which controller copes; for the page's head.
-        blocks: What is shown, in order.
+        lead: A description in a sentence.
+        motion: What joint motion does to the error, if known; for the head of the page.
+        verdict: Which controller copes; for the head of the page.
+        blocks: The blocks, in order.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""What the kinds of results show."""
+"""Turns every kind of result into a chapter."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ SCORES = (
     "variation how much it changes in a second: chattering. A lost robot counts 0.5 m or more."
 )
 CONDITIONS = (
-    "What the simulation does to a controller. Current and coefficients are drawn anew for each "
-    "episode, and no controller is told; all meet the same episodes and the same noise."
+    "What the simulation does to a controller. Every episode has another current and other "
+    "coefficients, which no controller knows; all meet the same episodes and the same noise."
 )
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What is replayed, and on what.
+    """What to replay.
 
     Attributes:
         policies: The policies; None means those of the result.
-        scenario: Which of the result's scenarios, from 0 on.
+        scenario: The index of one of the result's scenarios.
         workers: Number of processes.
     """
 
@@ -72,7 +72,7 @@ class Choice:
 
 
 def read(path: Path) -> Result:
-    """A result from its file.
+    """Read a result from its file.
 
     Raises:
         UsageError: If it is not a result, or its kind has no chapter.
@@ -80,21 +80,21 @@ def read(path: Path) -> Result:
     """
     document = read_json(path)
     kind = document.get("kind") if isinstance(document, dict) else None
-    known = {result_type.kind: result_type for result_type in CHAPTERS}
+    known = {result.kind: result for result in CHAPTERS}
     require(isinstance(kind, str) and kind in known, f"kind of {path}", kind, ", ".join(known))
     return known[str(kind)].parsed(document, path)
 
 
 def chapter(result: Result, choice: Choice, progress: Progress) -> Chapter:
-    """What there is to show of a result.
+    """Make the chapter of a result.
 
     Args:
         result: The result.
-        choice: What is replayed.
-        progress: Called with the number of episodes that are computed, and that there are.
+        choice: What to replay.
+        progress: Called with the number of computed episodes and of all episodes.
 
     Raises:
-        UsageError: If nothing can be replayed as chosen.
+        UsageError: If the choice cannot be replayed.
     """
     return CHAPTERS[type(result)](result, choice, progress)
 
@@ -125,8 +125,8 @@ def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -
     rows = result.main
     episodes = len(scenarios[MAIN])
     tables = {
-        name: score_table(standings, result.refused.get(name, {}))
-        for name, standings in result.suites.items()
+        name: score_table(rows, result.refused.get(name, {}))
+        for name, rows in result.suites.items()
     }
     known = {name: scenarios[name] for name in result.suites if name in scenarios}
     return Chapter(
@@ -151,8 +151,8 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
     scenarios, label = result.scenarios, result.label
     return Chapter(
         title=f"Robustness: {result.quantity}",
-        lead=f"How the errors of {len(result.results)} policies grow with one quantity, all else "
-        f"being equal, over {len(scenarios)} episodes at each value: {label}.",
+        lead=f"How the errors of {len(result.results)} policies grow with one quantity, with all "
+        f"else equal, over {len(scenarios)} episodes at every value: {label}.",
         motion="",
         verdict="",
         blocks=[
@@ -165,7 +165,12 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
                 {label: curve_table(result)},
             ),
             replay(scenarios, dict.fromkeys(result.results), result.axes, choice, progress),
-            *conditions("suite", "scenarios", scenarios, " These hold before anything is varied."),
+            *conditions(
+                "suite",
+                "scenarios",
+                scenarios,
+                " These are the conditions before anything is varied.",
+            ),
             names(),
             provenance(result.provenance),
         ],
@@ -175,7 +180,12 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
 def reproduction(result: ReproductionResult, choice: Choice, progress: Progress) -> Chapter:
     """The paper's Table 1, and its operation mode as a replay at the paper's step."""
     rows, paper, step = result.rows, result.paper, result.step
-    require(choice.policies is None, "--policies", "given", "none: a reproduction has its own laws")
+    require(
+        choice.policies is None,
+        "--policies",
+        "given",
+        "no policies: a reproduction has its own laws",
+    )
     require(choice.scenario == 0, "--scenario", choice.scenario, "0: a reproduction has one")
     chosen = {case.row: case for case in cases(step) if case.mode == MAIN_MODE}
     records = {}
@@ -198,8 +208,8 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
         blocks=[
             Tables(
                 "Table 1",
-                "Absolute maximum of the position error after settling; settled leaves out the 7 s "
-                "after each change of the joint references. Ours over the paper's lies between "
+                "Largest absolute position error after settling; settled leaves out the 7 s after "
+                "each change of the joint references. The ratio of ours to the paper's is between "
                 f"{figures(min(ratios))} and {figures(max(ratios))}.",
                 "table",
                 {"Table 1": paper_table(result)},
@@ -237,7 +247,7 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     trained = [rows for rows in (result.agents, result.ablations) if rows]
     return Chapter(
         title="Study of residual agents",
-        lead=f"{len(result.agents)} agents under several seeds, and what they owe to what.",
+        lead=f"{len(result.agents)} agents with several seeds, and what their parts contribute.",
         motion=motion(home),
         verdict=verdict(home, len(episodes)),
         blocks=[
@@ -266,14 +276,14 @@ CHAPTERS: dict[type[Result], Callable[[Any, Choice, Progress], Chapter]] = {
 
 
 def by_total(rows: Mapping[str, Scores]) -> dict[str, Scores]:
-    """Rows, the smaller error first."""
+    """Sort rows by their error, the smallest first."""
     return dict(sorted(rows.items(), key=lambda pair: pair[1].total))
 
 
 def conditions(
     label: str, name: str, scenarios: Sequence[Scenario | OtherScenario], besides: str = ""
 ) -> list[Tables]:
-    """The conditions of a result, if its scenarios are of the robot that has such."""
+    """The conditions of a result, if its scenarios are of the planar robot."""
     planar = planar_only(scenarios)
     if not planar:
         return []
@@ -282,13 +292,13 @@ def conditions(
 
 
 def planar_only(scenarios: Sequence[Scenario | OtherScenario]) -> list[Scenario]:
-    """Scenarios, if all are of the planar robot."""
+    """The scenarios, if all are of the planar robot; otherwise none."""
     planar = [scenario for scenario in scenarios if isinstance(scenario, Scenario)]
     return planar if len(planar) == len(scenarios) else []
 
 
 def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
-    """Error against thrust variation, if anybody has scores."""
+    """Error against thrust variation, if there are scores."""
     return [plots.front(rows, {})] if axes else []
 
 
@@ -299,7 +309,7 @@ def replay(
     choice: Choice,
     progress: Progress,
 ) -> Replay | Facts:
-    """An episode of the policies of a result, or why there is none to be seen.
+    """Replay an episode of the policies of a result, or say why that is impossible.
 
     Args:
         scenarios: The scenarios of the result.
@@ -332,7 +342,7 @@ def replay(
     changed = differing(episodes.max_error, episode_errors(rows, shown, index))
     if changed:
         notes.append(
-            f"Not as in the result, for something has changed since: {', '.join(changed)}."
+            f"Not as in the result, because something has changed since: {', '.join(changed)}."
         )
     able_to_win = (name for name in shown if (row := rows.get(name)) is None or competes(row))
     best = next(able_to_win, shown[0])
@@ -344,7 +354,7 @@ def replay(
 def episode_errors(
     rows: Mapping[str, Scores | None], names: Sequence[str], index: int
 ) -> dict[str, tuple[float, ...]]:
-    """The largest errors of an episode by axis, m, for the policies whose scores tell."""
+    """The largest errors of an episode in each axis, m, of the policies with scores."""
     known = {name: row for name in names if (row := rows.get(name)) and index < row.episodes}
     return {
         name: tuple(row.per_episode[MAX_ERROR + axis][index] for axis in row.axes)
@@ -355,10 +365,10 @@ def episode_errors(
 def able(
     rows: Mapping[str, Scores | None], choice: Choice
 ) -> tuple[list[Contender], dict[str, str]]:
-    """The policies to replay, and why others are not.
+    """The policies to replay, and the reasons why others are not replayed.
 
-    A file of results is given nothing to open or to run: of the names in it only those of
-    registered policies mean anything, unless the user gives the name, too.
+    A file of results cannot make the page open or run anything: only its names of registered
+    policies count, unless the user gives a name as well.
     """
     if choice.policies is not None:
         return list(choice.policies), {}
@@ -368,14 +378,14 @@ def able(
 
 
 def names() -> Facts:
-    """What the names of the policies mean."""
+    """The meanings of the policies' names."""
     meanings = {id: entry(id).summary for id in ids() if not id.endswith("-tuned")}
-    meanings["…-tuned"] = "the same law with gains that usm tune has found on sampled scenarios"
+    meanings["…-tuned"] = "the same law with gains from usm tune, on sampled scenarios"
     return Facts("What the names mean", meanings)
 
 
 def provenance(source: Provenance) -> Facts:
-    """Where a result comes from."""
+    """The provenance of a result."""
     packages = ", ".join(f"{name} {version}" for name, version in source.packages.items())
     seeds = "; ".join(f"{name}: {_listed(value)}" for name, value in source.seeds.items())
     return Facts(

@@ -19,11 +19,11 @@ VARIATION = "thrust variation, N/s"
 
 @dataclass(frozen=True)
 class Band:
-    """Errors at a place of a curve.
+    """Errors at one point of a curve.
 
     Attributes:
-        value: The place.
-        errors: Lower limit, mean and upper limit by axis, m; empty where there are none.
+        value: Its place on the axis.
+        errors: Lower limit, mean and upper limit by axis, m; empty if there are none.
     """
 
     value: float
@@ -31,11 +31,11 @@ class Band:
 
 
 def front(rows: Mapping[str, Scores], weights: Mapping[str, Sequence[FrontPoint]]) -> Plot:
-    """Error against thrust variation, and which policies no other beats in both.
+    """Plot error against thrust variation, and mark the policies that no other beats in both.
 
     Args:
         rows: Rows of the policies.
-        weights: Points of policies that are tuned with other weights, by their id.
+        weights: Points of policies tuned with other weights, by id.
     """
     besides = f" A line joins other weights of {', '.join(weights)}." if weights else ""
     variations = {name: row.metrics["thrust_variation"].mean for name, row in rows.items()}
@@ -63,8 +63,8 @@ def front(rows: Mapping[str, Scores], weights: Mapping[str, Sequence[FrontPoint]
         )
     return Plot(
         "Error against thrust variation",
-        "A small error is easily bought with thrusters that chatter. Filled are the policies that "
-        f"no other beats in both; left and below is better.{besides}",
+        "Chattering thrusters easily buy a small error. Filled points are policies that no other "
+        f"beats in both; left and below is better.{besides}",
         {
             "kind": "points",
             "x": {"label": VARIATION, "log": True},
@@ -84,7 +84,7 @@ def beaten(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> boo
 
 
 def robustness(result: RobustnessResult) -> Plot:
-    """Error against a quantity, with intervals."""
+    """Plot error against a quantity, with intervals."""
     curves = {
         name: [
             Band(
@@ -99,7 +99,7 @@ def robustness(result: RobustnessResult) -> Plot:
     }
     return error_curves(
         "Error curves",
-        "Largest position error after settling, mean over the episodes; shaded is its 95 % "
+        "Largest position error after settling, mean over the episodes; the shade is its 95 % "
         "interval.",
         curves,
         result.axes,
@@ -108,7 +108,7 @@ def robustness(result: RobustnessResult) -> Plot:
 
 
 def learning(rows: Mapping[str, Trained], axes: Sequence[str]) -> Plot:
-    """Error against the steps of a training, from the best seed to the worst."""
+    """Plot error against the steps of a training, from the best seed to the worst."""
     curves: dict[str, list[Band]] = {}
     for name, row in rows.items():
         curves[name] = []
@@ -133,14 +133,14 @@ def error_curves(
     axes: Iterable[str],
     label: str,
 ) -> Plot:
-    """Errors axis by axis against something."""
+    """Plot the errors in each axis against a quantity."""
     panels = []
     for axis in axes:
         series = []
         for name, bands in curves.items():
             known = [band.errors.get(axis) for band in bands]
             low, mean, high = (
-                [None if error is None else 1e3 * error[k] for error in known] for k in range(3)
+                [None if limits is None else 1e3 * limits[k] for limits in known] for k in range(3)
             )
             values = [band.value for band in bands]
             series.append({"name": name, "x": values, "y": mean, "low": low, "high": high})

@@ -1,6 +1,6 @@
-"""Episodes for a page: computed anew, thinned out and packed.
+"""Computes episodes for a page again, thins them out and packs them.
 
-What is played is a chain of links in a plane: results with other axes than its have no replay.
+The page plays a chain of links in a plane; results with other axes have no replay.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ Array = NDArray[np.float64]
 
 # The axes of the plane that the page draws.
 PLANE = ("x", "y")
-# Pictures of the robot per second; errors and thrust are kept as often as they are measured.
+# Pictures of the robot per second; errors and thrust are kept at every control instant.
 FPS = 10.0
-# Of a record at the paper's step, one error and effort every so often, s.
+# The time between two errors and efforts that are kept of a record at the paper's step, s.
 RECORD_PERIOD = 0.01
 INT16 = 32767
-# Scores that differ by more than this share are not those of the result.
+# Scores that differ by more than this share count as different from the result.
 TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class Acted:
-    """What a policy did.
+    """A policy's episode.
 
     Attributes:
-        data: What the page plays of it.
-        reference: Link angles of the reference posture by picture, rad, (pictures, links).
-        current: Velocity of the water by picture, m/s, (pictures, 2).
-        max_error: Largest errors after settling by axis, m.
+        data: The data that the page plays.
+        reference: Link angles of the reference posture, rad, (pictures, links).
+        current: Velocity of the water, m/s, (pictures, 2).
+        max_error: Largest error after settling in each axis, m.
     """
 
     data: dict[str, Any]
@@ -54,12 +54,12 @@ class Acted:
 
 @dataclass(frozen=True)
 class Episodes:
-    """One scenario, as several policies met it.
+    """Episodes of several policies in one scenario.
 
     Attributes:
-        data: What the page plays.
-        max_error: Largest errors after settling, by policy and axis, m.
-        missing: Why a policy is not there, by name.
+        data: The data that the page plays.
+        max_error: Largest errors after settling by policy, in each axis, m.
+        missing: Why a policy is missing, by name.
     """
 
     data: dict[str, Any]
@@ -68,7 +68,7 @@ class Episodes:
 
 
 def packed(values: Array) -> dict[str, Any]:
-    """An array as 16-bit integers, in base64, with the scale that gives it back."""
+    """Pack an array as 16-bit integers in base64, with the scale that restores it."""
     scale = float(np.abs(values).max(initial=0.0)) / INT16 or 1.0
     whole = np.rint(values / scale).astype("<i2")
     data = base64.b64encode(whole.tobytes()).decode()
@@ -87,10 +87,10 @@ def replayed(
         contenders: The policies.
         scenario: The scenario.
         workers: Number of processes.
-        progress: Called whenever a policy has finished.
+        progress: Called after every policy.
 
     Returns:
-        What they did; no episodes if none of them acts.
+        Their episodes; none if no policy acts.
     """
     done: dict[int, Acted | str] = {}
     tasks = [(contender, scenario) for contender in contenders]
@@ -107,7 +107,7 @@ def replayed(
             acted[contender.name] = outcome
     if not acted:
         return Episodes({"episodes": {}}, {}, missing)
-    longest = max(acted.values(), key=lambda run: len(run.reference))
+    longest = max(acted.values(), key=lambda episode: len(episode.reference))
     period = scenario.conditions.control_period
     shown = instants(scenario, FPS, 1.0)
     data = frame(scenario, scenario.reference_positions()[shown]) | {
@@ -115,13 +115,14 @@ def replayed(
         "period": period,
         "current": packed(longest.current),
         "reference": packed(longest.reference),
-        "episodes": {name: run.data for name, run in acted.items()},
+        "episodes": {name: episode.data for name, episode in acted.items()},
     }
-    return Episodes(data, {name: run.max_error for name, run in acted.items()}, missing)
+    errors = {name: episode.max_error for name, episode in acted.items()}
+    return Episodes(data, errors, missing)
 
 
 def act(contender: Contender, scenario: Scenario) -> Acted | str:
-    """Let a policy act in a scenario; or why it cannot."""
+    """Let a policy act in a scenario, or say why it cannot."""
     try:
         acted = take(contender, scenario, instants(scenario, FPS, 1.0))
     except UsageError as error:
@@ -143,7 +144,7 @@ def act(contender: Contender, scenario: Scenario) -> Acted | str:
 
 
 def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any]:
-    """What the page plays of records at the paper's step, by the name of their law."""
+    """The data that the page plays of records at the paper's step, by law."""
     first = next(iter(records.values()))
     spacing = float(first.time[1] - first.time[0])
     every, sparse = round(RECORD_PERIOD / spacing), round(1.0 / (FPS * spacing))
@@ -166,7 +167,7 @@ def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any
 
 
 def frame(scenario: Scenario, path: Array) -> dict[str, Any]:
-    """What all policies of a scenario have in common; path: at every picture, m, (k, 2)."""
+    """The data that all policies of a scenario share; path: at every picture, m, (k, 2)."""
     robot = scenario.body
     return {
         "duration": scenario.duration,
@@ -189,7 +190,7 @@ def frame(scenario: Scenario, path: Array) -> dict[str, Any]:
 def differing(
     errors: Mapping[str, tuple[float, ...]], expected: Mapping[str, tuple[float, ...]]
 ) -> list[str]:
-    """Policies whose largest errors by axis, m, are not as expected."""
+    """The policies whose largest errors, m, differ from the expected ones."""
     return [
         name
         for name, wanted in expected.items()

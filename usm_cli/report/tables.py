@@ -1,4 +1,4 @@
-"""The tables of a page."""
+"""Makes the tables of a page."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ CONDITIONS = (
 
 
 def competes(row: Scores) -> bool:
-    """Whether a policy is told no more than a vehicle knows."""
+    """Whether a policy knows no more than a vehicle does."""
     return row.competitor if isinstance(row, CompetitorScores) else True
 
 
 def lead_of(row: Scores) -> Lead | None:
-    """A row's lead over the next, if it has one."""
+    """A row's lead over the next row, if it has one."""
     return row.beats_next if isinstance(row, Standing) else None
 
 
@@ -119,7 +119,7 @@ def paper_table(result: ReproductionResult) -> SortableTable:
 
 
 def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
-    """Under which conditions the episodes of the suites run, one row per suite."""
+    """The conditions of the episodes of suites, one row per suite."""
     body = []
     for name, scenarios in suites.items():
         conditions = scenarios[0].conditions
@@ -143,10 +143,10 @@ def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
 
 
 class LogScale:
-    """A logarithmic scale on which all errors of a table have their place.
+    """A logarithmic scale for all errors of a table.
 
     Attributes:
-        ticks: Decades in mm, and where they are, per cent.
+        ticks: Decades in mm and their places, per cent.
     """
 
     def __init__(self, errors: Iterable[Summary]) -> None:
@@ -159,7 +159,7 @@ class LogScale:
         self.ticks = [(f"{10.0 ** (power + 3):g}", self._place(10.0**power)) for power in decades]
 
     def marks(self, errors: Mapping[str, Summary]) -> dict[str, Mark]:
-        """Where errors are, by axis."""
+        """The places of errors, by axis."""
         return {axis: Mark(*map(self._place, _numbers(error))) for axis, error in errors.items()}
 
     def _place(self, metres: float) -> float:
@@ -179,7 +179,7 @@ def length(metres: float) -> Cell:
 
 
 def decision(lead: Lead | None) -> Cell:
-    """Whether a row is better than the next, and with what probability in an episode."""
+    """Whether a row is better than the next, and with what probability per episode."""
     if lead is None:
         return Cell("", -1.0)
     return Cell(in_short(lead), lead.probability, f"{lead.probability:.2f}")

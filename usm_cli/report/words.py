@@ -1,4 +1,4 @@
-"""What scores and scenarios say, in sentences."""
+"""Describes scores and scenarios in sentences."""
 
 from __future__ import annotations
 
@@ -12,24 +12,23 @@ from usm_gym.support.text import listed, mm
 from usm_gym.task.metrics import RECOVERY
 from usm_gym.task.scenario import Scenario
 
-# The paper's controller, beside which the best one is shown.
+# The paper's controller, with which the best one is compared.
 PAPERS = "sta"
 
 
 def in_axes(row: Scores, metric: str) -> str:
-    """The means of a metric, axis by axis, in words."""
-    return listed(
-        [f"{mm(summary.mean)} mm in {axis}" for axis, summary in row.by_axis(metric).items()]
-    )
+    """Write the mean of a metric in each axis."""
+    errors = row.by_axis(metric).items()
+    return listed([f"{mm(error.mean)} mm in {axis}" for axis, error in errors])
 
 
 def competitors(rows: Mapping[str, Scores]) -> dict[str, Scores]:
-    """The rows of those that are told no more than a vehicle knows and lost no robot."""
+    """The rows of policies that know no more than a vehicle does and lost no robot."""
     return {name: row for name, row in rows.items() if competes(row) and row.failures == 0}
 
 
 def motion(rows: Mapping[str, Scores]) -> str:
-    """What the joint motion does to the controller that it harms most."""
+    """Describe what joint motion does to the controller that it harms most."""
 
     def calm(row: Scores) -> float:
         return sum(error.mean for error in row.by_axis("settled_error").values())
@@ -46,14 +45,14 @@ def motion(rows: Mapping[str, Scores]) -> str:
 
 
 def verdict(rows: Mapping[str, Scores], episodes: int) -> str:
-    """Which controller copes best, beside the paper's."""
+    """Compare the best controller with the paper's."""
     known = competitors(rows)
     if not known:
         return ""
     best = min(known, key=lambda name: known[name].total)
     said = (
-        f"The best, {best}, keeps it to {in_axes(known[best], 'max_error')}, mean of {episodes} "
-        f"episodes{'' if episodes >= FEWEST_EPISODES else ', too few for a conclusion'}."
+        f"The best, {best}, keeps it to {in_axes(known[best], 'max_error')}, the mean of "
+        f"{episodes} episodes{'' if episodes >= FEWEST_EPISODES else ', too few for a conclusion'}."
     )
     if PAPERS in rows and best != PAPERS:
         said += f" The paper's {PAPERS} comes to {in_axes(rows[PAPERS], 'max_error')}."
@@ -61,7 +60,7 @@ def verdict(rows: Mapping[str, Scores], episodes: int) -> str:
 
 
 def in_words(scenario: Scenario) -> str:
-    """A scenario in a sentence or two."""
+    """Describe a scenario in a sentence or two."""
     path, water, conditions = scenario.path, scenario.water, scenario.conditions
     parts = [f"{scenario.mode} mode, {scenario.duration:g} s, at {100 * path.speed:.1f} cm/s"]
     if scenario.shifts:
@@ -69,7 +68,7 @@ def in_words(scenario: Scenario) -> str:
         listed = ", ".join(f"{angle:+.2f} rad at {time:.1f} s" for angle, time in bends)
         listed = listed.replace("-", "−")
         parts.append(f"the last {scenario.inspection.bending_joints} joints bend by {listed}")
-    current = (sum(speed**2 for speed in water.current)) ** 0.5
+    current = sum(speed**2 for speed in water.current) ** 0.5
     parts.append(f"current {100 * current:.1f} cm/s")
     low, high = min(water.coefficients), max(water.coefficients)
     parts.append(f"true coefficients {low:.2f} to {high:.2f} of the nominal ones")

@@ -1,4 +1,4 @@
-"""Results as files: a frozen dataclass per kind, checked when it is read."""
+"""Results as files: every kind is a frozen dataclass that is checked when it is read."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ Interval = tuple[Number, Number]
 class Part:
     """A part of a result.
 
-    In JSON the entries of the field that `beside` names stand beside the other fields, and a field
-    that is None by default is left out while it is None. `order` names the fields in the order of
-    the JSON, where it is not their own.
+    In JSON, the entries of the field named by `beside` are beside the other fields. A field whose
+    default is None is left out while it is None. `order` names the fields in the order of the JSON,
+    if that differs from their own.
     """
 
     beside: ClassVar[str] = ""
@@ -58,13 +58,13 @@ class Part:
 
 @validated
 class Provenance:
-    """Where a result comes from.
+    """The origin of a result.
 
     Attributes:
         version: Version of usm-gym.
-        commit: Commit of its checkout; None where it is none.
-        packages: Versions of Python and of the packages that numbers may depend on.
-        seeds: The seeds it depends on, or what they came from.
+        commit: Commit of its checkout; None without a checkout.
+        packages: Versions of Python and of the packages on which numbers may depend.
+        seeds: The seeds on which it depends, or their origin.
         command: The command that made it.
     """
 
@@ -76,17 +76,17 @@ class Provenance:
 
     @classmethod
     def here(cls, seeds: Mapping[str, Any]) -> Self:
-        """The provenance of what this process makes from some seeds."""
+        """Describe what this process makes from some seeds."""
         return cls(**provenance(seeds))
 
 
 class Result:
-    """A result that is kept in a JSON file; every kind of result is a validated dataclass.
+    """A result in a JSON file; every kind of result is a validated dataclass.
 
     Attributes:
-        kind: What it is.
-        form: Version of its fields. A file says it under "form" unless it is 1.
-        marked: Whether its files say their kind.
+        kind: Name of the kind.
+        form: Version of its fields; a file states it under "form" unless it is 1.
+        marked: Whether its files state their kind.
     """
 
     kind: ClassVar[str]
@@ -98,7 +98,7 @@ class Result:
         """Read a result.
 
         Raises:
-            UsageError: If the file holds none of this kind.
+            UsageError: If the file holds no result of this kind.
             OSError: If it cannot be read.
         """
         return cls.parsed(read_json(path), path)
@@ -125,7 +125,7 @@ class Result:
             return TypeAdapter(cls).validate_python(content)
 
     def document(self) -> dict[str, Any]:
-        """The result in JSON's types."""
+        """Write the result in JSON's types."""
         head: dict[str, Any] = {"kind": self.kind} if self.marked else {}
         if self.form != 1:
             head["form"] = self.form

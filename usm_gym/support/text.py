@@ -18,6 +18,6 @@ def mm(metres: float) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words as a sentence lists them: "x", "x and y", "x, y and z"."""
+    """List words as in a sentence: "x", "x and y", "x, y and z"."""
     *most, last = words
     return f"{', '.join(most)} and {last}" if most else last

@@ -31,21 +31,21 @@ _repr.maxstring = _repr.maxother = _repr.maxlong = QUOTED
 
 
 class UsageError(ValueError):
-    """What a user can mend: an argument, an option or a file is not as it has to be.
+    """A mistake that the user can correct, in an argument, an option or a file.
 
-    The `usm` command answers with one line. Other exceptions, `OSError` aside, are bugs of ours.
+    The `usm` command answers with one line. All other exceptions except `OSError` are our own bugs.
     """
 
 
 @contextmanager
 def explaining(what: str) -> Iterator[None]:
-    """Put what an input is taken for before the reason why it is refused.
+    """Put an explanation before the reason for which an input is refused.
 
     Args:
-        what: For instance "mine.json is no file of gains".
+        what: The explanation, for instance "mine.json is no file of gains".
 
     Raises:
-        UsageError: If the input is refused inside.
+        UsageError: If the block refuses the input.
     """
     try:
         yield

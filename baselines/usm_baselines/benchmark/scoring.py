@@ -25,7 +25,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import BATCH, Evaluation, evaluate, joined, metric_names
-from usm_gym.policy import Policy
+from usm_gym.policy import Policy, is_privileged, nominal_of
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
 from usm_gym.support.validation import (
@@ -106,6 +106,7 @@ def score_all(
     workers: int = 1,
     cache: Path | None = None,
     progress: Callable[[int], object] = lambda episodes: None,
+    batch: int = BATCH,
 ) -> list[Evaluation | Refusal]:
     """Score every job.
 
@@ -116,6 +117,7 @@ def score_all(
             are none of refused policies, nor of those whose code is not known. A file that is
             damaged is written anew, after a warning.
         progress: Called with the number of episodes done since the last call.
+        batch: How many episodes are run side by side at most; without effect on the result.
 
     Returns:
         Scores or the reason why there are none, in the order of the jobs.
@@ -132,8 +134,8 @@ def score_all(
             progress(len(job.scenarios))
             continue
         waiting[index] = {}
-        for first in range(0, len(job.scenarios), BATCH):
-            batches.append((job, first, first + BATCH))
+        for first in range(0, len(job.scenarios), batch):
+            batches.append((job, first, first + batch))
             places.append(index)
     for number, outcome in parallel.results(score_batch, batches, workers):
         job, first, last = batches[number]
@@ -141,7 +143,7 @@ def score_all(
         parts = waiting[index]
         parts[first] = outcome
         progress(len(job.scenarios[first:last]))
-        if len(parts) == len(range(0, len(job.scenarios), BATCH)):
+        if len(parts) == len(range(0, len(job.scenarios), batch)):
             outcomes[index] = _whole([parts[first] for first in sorted(parts)])
             _write(cache, job, outcomes[index])
     return [outcomes[index] for index in range(len(jobs))]
@@ -170,8 +172,8 @@ class Timed:
 
     def __init__(self, policy: Policy, limit: float) -> None:
         """Allow a policy `limit` seconds in all."""
-        self.nominal = getattr(policy, "nominal", None)
-        self.privileged = getattr(policy, "privileged", False)
+        self.nominal = nominal_of(policy)
+        self.privileged = is_privileged(policy)
         self._policy = policy
         self._limit = self._left = limit
 

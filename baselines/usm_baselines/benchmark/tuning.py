@@ -43,8 +43,6 @@ from usm_gym.task.scenario import Mode, Scenario
 VARIATION_WEIGHT = 0.002
 # Trials asked for at once, from what is known before all of them.
 ROUND = 8
-# Episodes after which a trial may be given up.
-FIRST_EPISODES = 16
 # Objective of a trial that has no score, mm.
 FAILED = 1e4
 # Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.
@@ -65,6 +63,7 @@ class Problem:
         mode: "operation" or "torpedo".
         conditions: Conditions of the sampled scenarios.
         seed: Seed of scenarios and sampler.
+        first_episodes: Episodes after which a trial may be given up.
     """
 
     policy: str
@@ -73,6 +72,7 @@ class Problem:
     mode: Mode = "operation"
     conditions: Conditions = FIELD
     seed: int = 0
+    first_episodes: int = 16
 
     def __post_init__(self) -> None:
         """Refuse a policy without a space, and numbers that make no sense."""
@@ -81,6 +81,7 @@ class Problem:
         require(self.budget.episodes >= 1, "episodes", self.budget.episodes, "1 or more")
         require(0 <= self.weight <= 1000, "weight", self.weight, "0 to 1000")
         require(self.seed >= 0, "seed", self.seed, "0 or more")
+        require(self.first_episodes >= 1, "first_episodes", self.first_episodes, "1 or more")
 
     @property
     def space(self) -> Space:
@@ -247,13 +248,14 @@ def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
     }
     trials = [study.ask(space) for _ in range(size)]
     jobs = [problem.job(trial.params, TUNING) for trial in trials]
-    begun = _scored(jobs, 0, FIRST_EPISODES, workers)
+    first = problem.first_episodes
+    begun = _scored(jobs, 0, first, workers)
     for index, trial in enumerate(trials):
         trial.report(objective(begun[index], problem.weight), 0)
     going = [index for index, trial in enumerate(trials) if not trial.should_prune()]
     outcomes = {index: begun[index] for index in going}
-    if problem.budget.episodes > FIRST_EPISODES:
-        rest = _scored([jobs[index] for index in going], FIRST_EPISODES, None, workers)
+    if problem.budget.episodes > first:
+        rest = _scored([jobs[index] for index in going], first, None, workers)
         outcomes = {index: _joined(begun[index], rest[k]) for k, index in enumerate(going)}
     for index, trial in enumerate(trials):
         outcome = outcomes.get(index)

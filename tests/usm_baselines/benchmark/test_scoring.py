@@ -125,15 +125,12 @@ def test_an_unstable_controller_loses_the_robot_and_is_scored() -> None:
     assert outcome.per_episode["max_error_x"].min() >= 0.5
 
 
-def test_scores_are_those_of_evaluate_however_they_are_computed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_scores_are_those_of_evaluate_however_they_are_computed() -> None:
     expected = usm_gym.evaluate(contender("sta").make(job().nominal), SCENARIOS)
-    monkeypatch.setattr(scoring, "BATCH", 2)
     episodes: list[int] = []
     for workers in (1, 2):
         jobs = [job("sta"), job("sta", SCENARIOS[::-1])]
-        one, turned = score_all(jobs, workers, progress=episodes.append)
+        one, turned = score_all(jobs, workers, progress=episodes.append, batch=2)
         assert_same(one, expected)
         assert isinstance(turned, Evaluation)
         for name, values in turned.per_episode.items():
@@ -211,7 +208,7 @@ from pathlib import Path
 from support.episodes import short
 from usm_baselines.benchmark import scoring
 from usm_baselines.contender import contender
-from usm_gym import Robot
+from usm_gym.task.nominal import shared_nominal
 
 jobs = []
 for seed in range(8):

@@ -38,11 +38,10 @@ PROBLEM_BUDGET = Budget(trials=20, episodes=3)
 
 @pytest.fixture(autouse=True)
 def _small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Declare a space for the STA, and tune on episodes of a second, one of which is the first."""
+    """Declare a space for the STA, and tune on episodes of a second."""
     entries = dict(registry._entries)
     entries["sta"] = replace(entries["sta"], space=SPACE)
     monkeypatch.setattr(registry, "_entries", entries)
-    monkeypatch.setattr(tuning, "FIRST_EPISODES", 1)
     sample = tuning.sample
 
     def brief(*arguments: Any) -> Any:
@@ -52,7 +51,7 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def problem(**changes: Any) -> Problem:
-    return Problem(**{"policy": "sta", "budget": PROBLEM_BUDGET, **changes})
+    return Problem(**{"policy": "sta", "budget": PROBLEM_BUDGET, "first_episodes": 1, **changes})
 
 
 def test_the_objective_is_the_declared_one() -> None:
