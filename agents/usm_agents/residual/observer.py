@@ -64,7 +64,7 @@ class FrameTable(NamedTuple):
 @shared
 def unsigned(total):
     """A sum without the sign of its zero; not a `piece`, whose flags let the compiler drop this."""
-    return total if total != 0.0 else 0.0
+    return abs(total) if total == 0.0 else total
 
 
 @piece
