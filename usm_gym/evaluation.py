@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.policy import as_action
+from usm_gym.policy import as_action, is_privileged, nominal_of
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.statistics import mean_interval
@@ -104,7 +104,7 @@ def evaluate(
     """Score a policy on scenarios, each with its own noise.
 
     Args:
-        policy: Anything with `predict` (`usm_gym.policy.Policy`); it is called with a batch axis.
+        policy: Anything with `predict` (`usm_gym.policy`); it is called with a batch axis.
             To be pickled for more than one worker. One with `privileged = True` is also given
             `snapshot=`, the true state. What was trained on the residual task goes in as
             `usm_agents.ResidualPolicy(env, model)`.
@@ -276,7 +276,7 @@ def _run(
     recording, size = _Recording(simulation), simulation.size
     state: Any = None
     for k in range(recording.length):
-        truth = {"snapshot": simulation.snapshot()} if getattr(policy, "privileged", False) else {}
+        truth = {"snapshot": simulation.snapshot()} if is_privileged(policy) else {}
         start, seen = np.full(size, k == 0), simulation.observation.copy()
         answer = policy.predict(seen, state, start, deterministic=True, **truth)
         require(
@@ -302,7 +302,7 @@ def _run(
 
 def _require_period(policy: Any, period: float) -> None:
     """Refuse a policy that was made for another control period."""
-    known = getattr(policy, "nominal", None)
+    known = nominal_of(policy)
     if known is not None:
         own = known.control_period
         allowed = f"that for which the policy was made, {own}"

@@ -1,4 +1,4 @@
-"""What acts: the one thing that evaluation asks of a policy."""
+"""What acts, and what evaluation asks of it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.support.validation import real_array, require
+from usm_gym.task.nominal import Nominal
 
 
 class Policy(Protocol):
-    """Anything that acts: Stable-Baselines3's `predict`, for one observation or a batch.
-
-    A policy may have `nominal`, the knowledge that it was made from; it is then refused where the
-    control period is another one. With `privileged = True` it is given the true state, `snapshot=`,
-    at each call.
-    """
+    """Anything that acts: Stable-Baselines3's `predict`, for one observation or a batch."""
 
     def predict(
         self,
@@ -27,6 +23,31 @@ class Policy(Protocol):
     ) -> tuple[Any, Any]:
         """Return the action, and the state to pass to the next call."""
         ...
+
+
+class KnowingPolicy(Policy, Protocol):
+    """A policy that also says what it knows.
+
+    Attributes:
+        nominal: The nominal knowledge that it was made from; it is refused where the control period
+            is another one.
+        privileged: Whether `predict` is also given `snapshot=`, the true state. Such a policy is no
+            competitor.
+    """
+
+    nominal: Nominal
+    privileged: bool
+
+
+def nominal_of(policy: Any) -> Nominal | None:
+    """What a policy was made from; None if it does not say."""
+    nominal: Nominal | None = getattr(policy, "nominal", None)
+    return nominal
+
+
+def is_privileged(policy: Any) -> bool:
+    """Whether a policy has to be given the true state."""
+    return bool(getattr(policy, "privileged", False))
 
 
 def as_action(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:

@@ -22,7 +22,7 @@ from usm_agents.study.plans import AGENTS
 from usm_agents.study.results import Dissection, ForceShares
 from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
-from usm_gym.policy import Policy
+from usm_gym.policy import Policy, is_privileged
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.nominal import Nominal, shared_nominal
@@ -50,7 +50,7 @@ class ForceLog:
     def __init__(self, nominal: Nominal, policy: Policy, limit: float) -> None:
         """Watch a policy; `limit` is that of the thrusters, N."""
         self.nominal, self._limit = nominal, limit
-        self.privileged = getattr(policy, "privileged", False)
+        self.privileged = is_privileged(policy)
         self.total: list[Array] = []
         self.base: list[Array] = []
         self._policy = policy

@@ -25,7 +25,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import BATCH, Evaluation, evaluate, joined, metric_names
-from usm_gym.policy import Policy
+from usm_gym.policy import Policy, is_privileged, nominal_of
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
 from usm_gym.support.validation import (
@@ -170,8 +170,8 @@ class Timed:
 
     def __init__(self, policy: Policy, limit: float) -> None:
         """Allow a policy `limit` seconds in all."""
-        self.nominal = getattr(policy, "nominal", None)
-        self.privileged = getattr(policy, "privileged", False)
+        self.nominal = nominal_of(policy)
+        self.privileged = is_privileged(policy)
         self._policy = policy
         self._limit = self._left = limit
 
