@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import gymnasium as gym
 from gymnasium.vector import AutoresetMode
 
 from usm_gym.envs.env import TrackingEnv
@@ -121,7 +122,8 @@ USMEnv.__doc__ = (USMEnv.__doc__ or "").replace(
 )
 
 
-class USMVectorEnv(TrackingVectorEnv):
+# Some clients, skrl for one, recognise a vector environment by its direct bases.
+class USMVectorEnv(TrackingVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
     """`num_envs` underwater swimming manipulators, each as in `USMEnv`, with the same bits.
 
     Made by `gym.make_vec("usm_gym:USM-Operation-v0", num_envs=256,
