@@ -16,7 +16,7 @@ from usm_gym.support.validation import UsageError, brief, real_array, require
 Array = NDArray[np.float64]
 
 HYDRODYNAMICS: tuple[Hydrodynamics, ...] = get_args(Hydrodynamics)
-# States that are worked on at a time: what the kernel needs for each is some 3 kB.
+# States that are worked on at a time; the kernel needs some 3 kB per state.
 CHUNK = 1024
 
 

@@ -25,7 +25,7 @@ from usm_gym.world import World, world_of
 BATCH = 64
 # What side by side is kept of all episodes: some three gigabytes.
 MOST_SAMPLES = 50_000_000
-# Of each axis.
+# Per axis.
 POSITION_METRICS = ("max_error", "settled_error", "rms_error")
 THRUST_METRICS = ("thrust_effort", "thrust_variation", "saturation_share")
 # The row of an episode that is no metric.
@@ -58,7 +58,7 @@ class Evaluation:
     """Scores of a policy, per episode in the order of the scenarios.
 
     Attributes:
-        per_episode: Values of each metric, as `metric_names` lists them, (episodes,).
+        per_episode: Values by metric, as `metric_names` lists them, (episodes,).
         failed: Which episodes lost the robot, (episodes,).
     """
 
@@ -71,7 +71,7 @@ class Evaluation:
         return np.asarray(metrics.total_error(self.per_episode))
 
     def summary(self) -> dict[str, Any]:
-        """Mean with interval and worst episode of each metric, failures, and all episodes."""
+        """Mean with interval and worst episode by metric, failures, and all episodes."""
         row: dict[str, Any] = {}
         for name, values in self.per_episode.items():
             mean, interval = mean_interval(values)
@@ -109,7 +109,7 @@ def evaluate(
             `snapshot=`, the true state. What was trained on the residual task goes in as
             `usm_agents.ResidualPolicy(env, model)`.
         scenarios: The episodes.
-        robot: The robot that carries them out; without one, that which each scenario names.
+        robot: The robot that carries them out; without one, the one that the scenario names.
         workers: Number of processes; without effect on the result, unless the policy's answer to
             a row depends on the other rows, as torch's does in its last bits.
         progress: Called now and then with the number of episodes done since the last call; with
@@ -151,7 +151,7 @@ def evaluate(
 
 
 def batches(episodes: int, workers: int = 1) -> list[slice]:
-    """Which episodes a policy meets side by side: a batch, or what each worker gets if less."""
+    """Which episodes a policy meets side by side: a batch, or a worker's share if that is less."""
     size = min(BATCH, -(-episodes // workers))
     return [slice(first, min(first + size, episodes)) for first in range(0, episodes, size)]
 
@@ -164,7 +164,7 @@ def rollout(
 ) -> list[Trajectory]:
     """Run a policy through scenarios, side by side as far as robot and timing agree.
 
-    `watch` is called with each simulation at its start and after each step.
+    `watch` is called with every simulation at its start and after every step.
     """
     trajectories: dict[int, Trajectory] = {}
 
@@ -214,7 +214,7 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
 
 
 class _Recording:
-    """What happens in a simulation, up to the end or the loss of each robot."""
+    """What happens in a simulation, robot by robot up to its end or loss."""
 
     def __init__(self, simulation: Simulation) -> None:
         """Make room for all control periods."""

@@ -18,7 +18,7 @@ from usm_gym.task.scenario import STILL, Scenario
 
 Array = NDArray[np.float64]
 
-# Differences are taken over this to either side, in the unit of each state and input. The drag
+# Differences are taken over this to either side, in the units of the states and inputs. The drag
 # v + v|v| bends at rest, which makes their error one of first order; rounding forbids much less.
 STEP = 2.0**-23
 
@@ -47,7 +47,7 @@ class LinearModel:
     Attributes:
         A: From states to states, (x, x).
         B: From inputs to states, (x, u).
-        states: Name, size and unit of each state, in order.
+        states: Names, sizes and units of the states, in order.
         inputs: The same of the inputs.
         period: Time between two instants k, the control period, s.
     """
@@ -60,7 +60,7 @@ class LinearModel:
 
     @property
     def slices(self) -> dict[str, slice]:
-        """Where each state stands, by name."""
+        """Where the states stand, by name."""
         ends = np.cumsum([state.size for state in self.states]).tolist()
         return {
             state.name: slice(end - state.size, end)
@@ -184,7 +184,7 @@ def _differences(simulation: Simulation) -> tuple[Array, Array]:
         return np.asarray(row[place])
 
     deviations = STEP * np.eye(place.size + thrusters)
-    columns = [(after(each) - after(-each)) / (2 * STEP) for each in deviations]
+    columns = [(after(step) - after(-step)) / (2 * STEP) for step in deviations]
     derivatives = np.stack(columns, axis=1)
     return derivatives[:, : place.size], derivatives[:, place.size :]
 

@@ -184,13 +184,15 @@ class Robot:
 
     @property
     def thruster_links(self) -> NDArray[np.int64]:
-        """Zero-based link index of each thruster, int64, shape (thrusters,)."""
+        """Zero-based link indices of the thrusters, int64, shape (thrusters,)."""
         return np.array([thruster.link - 1 for thruster in self.thrusters], dtype=np.int64)
 
     @property
     def thruster_is_normal(self) -> NDArray[np.bool_]:
         """Whether each thruster pushes across its link, bool, shape (thrusters,)."""
-        return np.array([each.direction == "normal" for each in self.thrusters], dtype=np.bool_)
+        return np.array(
+            [thruster.direction == "normal" for thruster in self.thrusters], dtype=np.bool_
+        )
 
     def link_centres(
         self, theta: NDArray[np.float64], position: NDArray[np.float64]

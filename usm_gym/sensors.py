@@ -1,7 +1,7 @@
 """What a robot senses: the table of an observation, and how its numbers are read.
 
-A table says of each entry its name, size, unit, scale and bound. Where an entry stands follows from
-the order.
+A table gives the name, size, unit, scale and bound of every entry. Where an entry stands follows
+from the order.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class Table(NamedTuple):
     """The layout of the observation, for kernels.
 
     Attributes:
-        starts: First index of each entry, and the size of the whole, int64.
-        gain: Observed value over physical value of each number.
-        bound: Bound of each observed number, float32.
+        starts: First indices of the entries, and the size of the whole, int64.
+        gain: Observed value over physical value, by number.
+        bound: Bounds of the observed numbers, float32.
     """
 
     starts: NDArray[np.int64]
@@ -64,7 +64,7 @@ class Layout(ABC):
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """Index of the first number of each entry, and the size of the whole, int64."""
+        """Indices of the first numbers of the entries, and the size of the whole, int64."""
         sizes = [entry.size for entry in self.entries]
         return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -75,7 +75,7 @@ class Layout(ABC):
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where each entry stands, by name."""
+        """Where the entries stand, by name."""
         return {
             entry.name: slice(int(start), int(start) + entry.size)
             for entry, start in zip(self.entries, self.starts, strict=False)
@@ -88,7 +88,7 @@ class Layout(ABC):
 
     @cached_property
     def bound(self) -> NDArray[np.float32]:
-        """Bound of each number of the observation, as it is returned, shape (size,), float32."""
+        """Bounds of the numbers of the observation, as it is returned, shape (size,), float32."""
         bounds = [np.full(entry.size, entry.bound / entry.scale) for entry in self.entries]
         return np.concatenate(bounds).astype(np.float32)
 

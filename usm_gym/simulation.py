@@ -45,15 +45,15 @@ class Simulation:
         world: The world that all robots are in.
         size: How many robots there are.
         layout: Table of the observation.
-        scenarios: The scenario of each robot.
-        count: Control periods since each start, int64, (size,).
+        scenarios: The robots' scenarios.
+        count: Control periods since the start, int64, (size,).
         error: True position errors, m, (size, axes).
         attitude_error: Attitude errors as known on board, rad, (size, angles).
         observation: Observations, float32, (size, numbers).
         max_error: Largest true errors so far after settling, m, (size, axes); 0 before.
         effort: Mean absolute thruster commands, N, (size,).
         lost: Which robots are lost (`usm_gym.task.loss`), (size,).
-        steps: Control periods in each episode, int64, (size,).
+        steps: Control periods per episode, int64, (size,).
         fleet: The state, as kernels take it.
         shared: What all robots share, as kernels take it.
     """
@@ -62,7 +62,7 @@ class Simulation:
         """Start all robots at the beginning of the given scenarios.
 
         Args:
-            scenarios: One scenario for each robot.
+            scenarios: One scenario per robot.
             threads: How many threads share a step, at most one per core; without effect on its
                 result.
         """

@@ -69,7 +69,7 @@ def ratio_interval(
     """Interval of the mean of a first policy over that of a second, on the same episodes.
 
     Args:
-        first: A score of the first policy in each episode, (episodes,).
+        first: Scores of the first policy, one per episode, (episodes,).
         second: The same of the second policy, in the same order.
         strata: To which stratum each episode belongs; without it, all are one.
     """
@@ -139,7 +139,7 @@ def compare(first: ArrayLike, second: ArrayLike, strata: Sequence[str] | None = 
     """Compare two policies on the same episodes.
 
     Args:
-        first: A score of the first policy in each episode, less being better, (episodes,).
+        first: Scores of the first policy, one per episode, less being better, (episodes,).
         second: The same of the second policy, in the same order.
         strata: To which stratum each episode belongs; without it, all are one.
 

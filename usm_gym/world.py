@@ -27,8 +27,8 @@ class Fleet(NamedTuple):
     """The robots that are simulated side by side, `size` of them in blocks of `lanes`.
 
     Attributes:
-        blocks: Numbers of all robots, (blocks, rows * lanes); a row is a number of each robot of
-            the block.
+        blocks: Numbers of all robots, (blocks, rows * lanes); a row holds one number
+            for every robot of the block.
         instant: Control periods since the start, int64, (size,).
         noise: Measurement errors of the position, m, (size, control instants, axes).
         settled: Control period from which on errors count, int64, (size,).
@@ -72,7 +72,7 @@ class Kernels(NamedTuple):
 
 
 class Episode(Protocol):
-    """What a world asks of a scenario, which also has all that is its own."""
+    """What a world asks of a scenario, which may have more."""
 
     @property
     def conditions(self) -> Conditions:
@@ -214,7 +214,7 @@ class World(ABC):
         Args:
             observation: Observations, (batch, numbers).
             matrices: Where to write: the forces along the axes, N, then the moments about the
-                attitude's angles, N m, that a unit force of each thruster makes,
+                attitude's angles, N m, that unit forces of the thrusters make,
                 (batch, axes + angles, thrusters).
         """
 

@@ -34,7 +34,7 @@ PREDICT = "predict(observation, state=None, episode_start=None, deterministic=Tr
 
 @dataclass(frozen=True)
 class Contender:
-    """A policy under the name by which it was asked for; it is made anew for each task.
+    """A policy under the name by which it was asked for; it is made anew for every task.
 
     Attributes:
         name: That name.

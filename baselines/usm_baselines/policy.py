@@ -39,7 +39,7 @@ class ScriptedPolicy:
     privileged = False
     # The law's gains: a `NamedTuple` of `Gain`, with the field `heading_gain`.
     Gains: type[Any]
-    # Names of the numbers that the law keeps for each axis, in order.
+    # Names of the numbers that the law keeps per axis, in order.
     state: tuple[str, ...] = ()
     # Those among them that the residual task shows to its agent.
     shown: tuple[str, ...] = ()
@@ -74,12 +74,12 @@ class ScriptedPolicy:
         return {name: first + index for index, name in enumerate(self.state)}
 
     def state_of(self, state: Array) -> dict[str, Array]:
-        """The law's own numbers in what `predict` returns, by name, each (batch, axes)."""
+        """The law's own numbers in what `predict` returns, by name, all (batch, axes)."""
         return {name: state[:, column] for name, column in self.columns.items()}
 
     @cached_property
     def law_shape(self) -> tuple[int, ...]:
-        """Shape of all that the law keeps of one robot, the numbers of `state` first."""
+        """Shape of what the law keeps of one robot, the numbers of `state` first."""
         return (self._model.axes, len(self.state))
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
@@ -99,12 +99,12 @@ class ScriptedPolicy:
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
     ) -> tuple[NDArray[np.float32], Array]:
-        """Act on one observation, or on each of a batch.
+        """Act on one observation or on a batch.
 
         Args:
             observation: Observation, (numbers,) or (batch, numbers).
             state: What the last call returned; None at the start.
-            episode_start: Where an episode starts and the state is to be forgotten, bool, a scalar
+            episode_start: Where an episode starts and the state is dropped, bool, a scalar
                 or (batch,).
             deterministic: Without effect: the laws are deterministic.
 

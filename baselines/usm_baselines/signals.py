@@ -28,7 +28,7 @@ class Model(NamedTuple):
         thrusters: Number of thrusters.
         mass: Mass of the robot, kg.
         h: Control period, s.
-        scale: Physical value over observed value of each number of the observation.
+        scale: Physical value over observed value, by number of the observation.
         position_error: Index of the first number of an entry of the observation.
         reference_velocity: The same.
         reference_acceleration: The same.

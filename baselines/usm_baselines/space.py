@@ -37,7 +37,7 @@ Space = Mapping[str, Range]
 class Gain(float):
     """The default of a gain, and what else there is to say of it.
 
-    A law's gains are a `NamedTuple` with one of these for each:
+    A law's gains are a `NamedTuple` with one of these per gain:
 
         k_p: float = Gain(1300.0, "N/m", "proportional gain", tuned=(30.0, 30000.0))
 
@@ -87,4 +87,4 @@ def space_of(gains: type[Any], **others: Range) -> Space:
         others: Ranges in the place of those declared, by name.
     """
     ranges = {name: others.get(name, gain.tuned) for name, gain in declared(gains).items()}
-    return {name: each for name, each in ranges.items() if each is not None}
+    return {name: span for name, span in ranges.items() if span is not None}

@@ -134,7 +134,7 @@ class TrackingEnv(gym.Env[Observation, NDArray[np.float32]]):
         return self._running.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Return to a snapshot; equal actions then have equal consequences, to the bit."""
+        """Return to a snapshot; equal actions then have equal consequences, bit for bit."""
         self._simulation = Simulation(snapshot.scenarios)
         self._simulation.restore(snapshot)
         _, terminated, truncated = outcome(self._simulation)
@@ -199,7 +199,7 @@ def scenario_of(
 def outcome(
     simulation: Simulation,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Rewards, terminations and truncations of the step just made, (size,) each."""
+    """Rewards, terminations and truncations of the step just made, all (size,)."""
     remaining = simulation.steps - simulation.count
     lost = simulation.lost
     rewards = reward(simulation.error, simulation.effort, simulation.limit)

@@ -26,7 +26,7 @@ class USMEnv(TrackingEnv):
     operation mode (`usm_gym:USM-Operation-v0`) the joints meanwhile bend the head side of the body
     one way, the other way and back, at about 10, 20 and 30 s, and so disturb it; in torpedo mode
     (`usm_gym:USM-Torpedo-v0`) the body is straight, the path faster, and the heading follows the
-    line of sight. The score of an episode is the largest true position error in each axis after
+    line of sight. The score of an episode is the largest true position error per axis after
     settling.
 
     ## Action
@@ -94,7 +94,7 @@ window shows every step in real time (drawing needs the extra `render`) |
     - v0: first version.
     """
 
-    # One frame for each control period; an instance corrects the rate if it has another period.
+    # One frame per control period; an instance corrects the rate if it has another period.
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 (Gymnasium's)
 
     def __init__(
@@ -129,8 +129,8 @@ class USMVectorEnv(TrackingVectorEnv):
     `USMEnv` with a batch axis; robot i with seed s behaves as the single environment with seed s.
 
     `reset(seed=s)` gives robot i the seed s + i; a list gives each its own. The option "scenario"
-    is for all robots, or a list with one for each (None draws one); the option "reset_mask", a bool
-    array, resets only some. All three autoreset modes are supported: "NextStep" (Gymnasium's
+    is for all robots, or a list with one per robot (None draws one); the option "reset_mask", a
+    bool array, resets only some. All three autoreset modes are supported: "NextStep" (Gymnasium's
     default), "SameStep" with `final_obs` and `final_info`, and "Disabled".
     """
 
@@ -154,7 +154,7 @@ class USMVectorEnv(TrackingVectorEnv):
             mode: "operation" or "torpedo".
             conditions: As of `USMEnv`.
             robot: As of `USMEnv`.
-            render_mode: As of `USMEnv`: "rgb_array" gives an image of each robot, "human" shows one
+            render_mode: As of `USMEnv`: "rgb_array" gives images of all robots, "human" shows one
                 robot in a window.
             autoreset_mode: What happens to a robot whose episode has ended.
             threads: How many threads share a step, at most one per core; without effect on its

@@ -206,7 +206,7 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         return VectorSnapshot(self.simulation.snapshot(), streams, self._done.copy())
 
     def restore(self, snapshot: VectorSnapshot) -> None:
-        """Return to a snapshot; equal actions then have equal consequences, to the bit."""
+        """Return to a snapshot; equal actions then have equal consequences, bit for bit."""
         self._simulation = Simulation(snapshot.simulation.scenarios, self.threads)
         self._simulation.restore(snapshot.simulation)
         self._streams = [seeding.np_random(0)[0] for _ in snapshot.streams]
@@ -215,9 +215,9 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         self._done = snapshot.done.copy()
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """An image of each robot, (480, 640, 3), in the mode "rgb_array"; otherwise None.
+        """Images of all robots, (480, 640, 3), in the mode "rgb_array"; otherwise None.
 
-        Each takes 0.9 MB, and is drawn anew at each call.
+        An image takes 0.9 MB, and every call draws anew.
 
         Raises:
             gymnasium.error.DependencyNotInstalled: Without the extra `render`.
@@ -247,7 +247,7 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         seeds = self._seeds(seed)
         if not self._streams:
             require(which.all(), "reset_mask", which, "all robots at the first reset")
-            return [seeding.np_random(each)[0] for each in seeds]
+            return [seeding.np_random(robot_seed)[0] for robot_seed in seeds]
         streams = list(self._streams)
         for index in np.flatnonzero(which).tolist():
             again = seeds[index] is None
@@ -259,7 +259,7 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
     def _seeds(self, seed: Any) -> list[int | None]:
         if isinstance(seed, (list, tuple)) or (isinstance(seed, np.ndarray) and seed.ndim):
             require(len(seed) == self.num_envs, "seed", seed, f"{self.num_envs} seeds")
-            return [checked_seed(each) for each in seed]
+            return [checked_seed(robot_seed) for robot_seed in seed]
         first = checked_seed(seed)
         return [None if first is None else first + i for i in range(self.num_envs)]
 
@@ -312,7 +312,7 @@ def checked_number(num_envs: Any) -> int:
     """A number of robots.
 
     Raises:
-        ValueError: If it is none, or too large.
+        ValueError: If it is not a positive integer, or too large.
     """
     allowed = f"1 to {MOST_ROBOTS}"
     require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)

@@ -4,7 +4,7 @@ The folder of a kernel is named after a hash of its sources: the file of the ker
 all modules that it imports, directly or not. numba's own cache looks only at the kernel's file and
 would serve stale code after an edit of a helper.
 
-numba's cache consists of pickles, so whoever can write in its folder can run code as the user.
+numba's cache consists of pickles, so anyone who can write in its folder can run code as the user.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def imports(file: Path, module: str) -> tuple[tuple[str, Path], ...]:
     """Names and files of the modules that the top of a module imports.
 
     Of `from package import name`, this is the module `package.name` if there is one, else `package`
-    itself: importing a module of a package does not depend on all that the package imports.
+    itself: importing a module of a package does not depend on everything that the package imports.
     """
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     names: set[str] = set()

@@ -48,10 +48,10 @@ def read_bytes(path: str | Path, largest: int = LARGEST, links: bool = True) -> 
 
 
 def read_text(path: str | Path) -> str:
-    """Read a file of text in UTF-8.
+    """Read a text file in UTF-8.
 
     Raises:
-        ValueError: If it is none, or no file as `read_bytes` takes it.
+        ValueError: If it is not UTF-8, or `read_bytes` refuses it.
         OSError: If it cannot be read.
     """
     try:
@@ -61,7 +61,7 @@ def read_text(path: str | Path) -> str:
 
 
 def read_json(path: str | Path, links: bool = True) -> Any:
-    """Read a file of JSON.
+    """Read a JSON file.
 
     Raises:
         ValueError: If it is not JSON, or `read_bytes` refuses it.
@@ -160,7 +160,7 @@ def holding(path: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # Unlinked while it is locked: whoever has opened it meanwhile sees that its name is gone.
+        # Unlinked while it is locked: a process that has opened it meanwhile sees its name gone.
         # Windows does not remove an open file.
         with suppress(PermissionError):
             file.unlink(missing_ok=True)

@@ -30,7 +30,7 @@ def provenance(seeds: Any) -> dict[str, Any]:
 
 
 def _text(argument: str) -> str:
-    """An argument as text: bytes that are none, which a shell can pass, are written as escapes."""
+    """An argument as text: bytes that are not text, which a shell can pass, become escapes."""
     return argument.encode(errors="backslashreplace").decode()
 
 

@@ -81,7 +81,7 @@ class Provenance:
 
 
 class Result:
-    """A result in a file of JSON; every kind of result is a validated dataclass.
+    """A result in a JSON file; every kind of result is a validated dataclass.
 
     Attributes:
         kind: Name of the kind.

@@ -35,8 +35,8 @@ class Conditions:
         hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
         thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
         thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
-        position_noise: Standard deviation of the position measurement in each axis, 0 to 1 m.
-        current_limit: Largest constant current in each axis, 0 to 5 m/s.
+        position_noise: Standard deviation of the position measurement, per axis, 0 to 1 m.
+        current_limit: Largest constant current per axis, 0 to 5 m/s.
         current_variation: Largest amplitude of a sinusoidal current on top of it, 0 to 5 m/s.
         coefficient_range: True hydrodynamic coefficients over the nominal ones, 0.01 to 100.
         deflection_range: Size of the head deflections, 0.001 to 20 rad.
@@ -59,7 +59,7 @@ class Conditions:
     motion: Switch = True
 
     def __post_init__(self) -> None:
-        """Refuse a control period that is no multiple of the step, and ranges that are none."""
+        """Refuse a control period that is not a multiple of the step, and reversed ranges."""
         multiple = self.control_period / self.physics_step
         require(
             1 <= round(multiple) <= MOST_SUBSTEPS

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.support.validation import real_array, require
 
-# Controllers are given this long after each change of the joint references, s.
+# Controllers are given this long after a change of the joint references, s.
 RECOVERY = 7.0
 TIME_TOLERANCE = 1e-9
-# Begins the names of the metric of Table 1 in each axis.
+# Begins the names of the metric of Table 1, one per axis.
 MAX_ERROR = "max_error_"
 
 
@@ -26,7 +26,7 @@ def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> ND
         settle_time: From when on errors count, s.
 
     Returns:
-        Largest |error| in each axis over time >= settle_time, m, shape (axes,).
+        Largest |error| by axis over time >= settle_time, m, shape (axes,).
 
     Raises:
         ValueError: If shapes do not match, a value is not finite or no sample is late enough.
@@ -38,7 +38,7 @@ def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> ND
 def settled_error(
     time: ArrayLike, error: ArrayLike, shifts: Sequence[float], settle_time: float = 5.0
 ) -> NDArray[np.float64]:
-    """The same maximum, leaving out the 7 s after each change of the joint references.
+    """The same maximum, leaving out the 7 s after every change of the joint references.
 
     Args:
         time: Times, s, shape (samples,).
@@ -47,7 +47,7 @@ def settled_error(
         settle_time: From when on errors count, s.
 
     Returns:
-        Largest |error| in each axis, m, shape (axes,).
+        Largest |error| by axis, m, shape (axes,).
     """
     times, errors, late = _checked(time, error, settle_time)
     for shift in shifts:

@@ -17,7 +17,7 @@ class Nominal:
         robot: The robot with its nominal coefficients; `usm_gym.world.world_of` gives its axes.
         control_period: Time between two actions, s.
         thruster_time_constant: First-order lag of the thrusters, s.
-        position_noise: Standard deviation of the position measurement in each axis, m.
+        position_noise: Standard deviation of the position measurement, per axis, m.
     """
 
     robot: Any

@@ -99,7 +99,7 @@ class Water:
 
     Attributes:
         current: Constant part of the water's velocity, global frame, -5 to 5 m/s.
-        amplitude: Amplitude of its sinusoidal part in each axis, -5 to 5 m/s.
+        amplitude: Amplitude of its sinusoidal part, by axis, -5 to 5 m/s.
         phase: Phase of that part at the start, -100 to 100 rad.
         period: Period of that part, 0.1 to 1e6 s.
         coefficients: True over nominal value of (c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the
@@ -280,7 +280,7 @@ def mode_of(value: Any) -> Mode:
     """The mode of a name.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If there is no such mode.
     """
     require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
     mode: Mode = value

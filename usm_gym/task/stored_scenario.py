@@ -31,7 +31,7 @@ def stored(value: Any) -> Scenario | OtherScenario:
     """A scenario of any world, or one in JSON's types, as results hold it.
 
     Raises:
-        UsageError: If it is none.
+        UsageError: If it is not a scenario.
     """
     if isinstance(value, (Scenario, OtherScenario)):
         return value

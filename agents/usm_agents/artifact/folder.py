@@ -59,7 +59,7 @@ class Agent:
         seed: Seed of the training, 0 to 4294967295.
         steps: After how many steps, 0 to 1e12.
         training: Settings, versions and the command of the training.
-        scores: Scores, each with where it comes from.
+        scores: Scores with their provenance.
     """
 
     summary: str
@@ -88,14 +88,14 @@ _ADAPTER = TypeAdapter(Agent)
 def write_agent(folder: Path, description: Mapping[str, Any], network: Network) -> None:
     """Write an agent; `description` has the fields of `Agent`, less those of the network.
 
-    Whoever reads meanwhile, or after a kill, finds the old agent or the new one: which it is, the
-    description decides, by the hash of the weights that it means.
+    A reader sees the old agent or the new one, also in between or after a kill: the description
+    decides which, by the hash of its weights.
     """
     arrays: dict[str, NDArray[np.float32]] = {}
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[f"weight_{k}"], arrays[f"bias_{k}"] = weight, bias
     if network.recurrence is not None:
-        arrays |= {RECURRENCE + name: each for name, each in network.recurrence._asdict().items()}
+        arrays |= {RECURRENCE + name: array for name, array in network.recurrence._asdict().items()}
     data = save(arrays)
     agent = Agent(
         **description,

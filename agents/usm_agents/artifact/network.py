@@ -45,8 +45,8 @@ class Network:
     """Fully connected layers from an observation to an action; a policy, as `predict` goes.
 
     Attributes:
-        weights: Of each layer, (inputs, outputs), float32.
-        biases: Of each layer, (outputs,), float32.
+        weights: Per layer, (inputs, outputs), float32.
+        biases: Per layer, (outputs,), float32.
         activation: Of the hidden layers.
         output: Of the last one.
         recurrence: A layer with memory before them, if there is one.

@@ -1,10 +1,10 @@
-"""Checkpoints of a training: its whole state, and all that its folder shows of it.
+"""Checkpoints of a training: its whole state, and what its folder shows of it.
 
 A checkpoint appears in one move. Agent and learning curve are part of it and are written from it,
-never the other way round: a training that was killed in between writes them again when it goes on.
+never the other way round: a training that was killed in between writes them again when it resumes.
 
-A checkpoint consists of pickles and of the learner's files, and a pickle is code: whoever reads one
-runs what its author wanted. What is passed on is the agent (`usm_agents.artifact.folder`).
+A checkpoint consists of pickles and of the learner's files, and a pickle is code: reading one runs
+what its author wanted. What is passed on is the agent (`usm_agents.artifact.folder`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from usm_gym.support.validation import UsageError, in_one_line
 
 CURVE, PROGRESS = "curve.json", "progress.pickle"
 PART = "checkpoint.part"
-# Patterns of the names of all that a training leaves in its folder.
+# Patterns of the names of the files that a training leaves in its folder.
 TRACES = (PLAN, "checkpoint*", CURVE, DESCRIPTION, "policy*.safetensors", "events.out.tfevents*")
 
 

@@ -27,7 +27,7 @@ def check_weights(weights: Iterable[NDArray[np.floating]]) -> None:
     Raises:
         DivergedError: If one has.
     """
-    if not all(np.all(np.abs(each) < LARGEST_WEIGHT) for each in weights):
+    if not all(np.all(np.abs(weight) < LARGEST_WEIGHT) for weight in weights):
         raise DivergedError(f"a weight is beyond {LARGEST_WEIGHT:g}")
 
 

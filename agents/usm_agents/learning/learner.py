@@ -40,9 +40,9 @@ class TrainingSetup:
         algorithm: The name under which the plan asks for the learner.
         settings: The settings that the name was registered with.
         seed: Seed of everything that the learner draws.
-        envs: The robots, on the residual task. What it observes is all that the agent will see.
+        envs: The robots, on the residual task. The agent will see nothing but what it observes.
         episode_seed: Seed of the scenarios that follow the first ones.
-        first_episodes: One for each robot, of all lengths, so that the robots are at different
+        first_episodes: One per robot, of all lengths, so that the robots are at different
             times of their episodes from then on.
         truth: Gives what no policy can observe, by name, for the robots as `envs` last returned
             them, in SI units, (robots, numbers). On the tasks of this package: "coefficients",
@@ -72,8 +72,8 @@ class Learner(Protocol):
 
         Args:
             steps: How many in all, those before a checkpoint included.
-            pause: To be called before each rollout, or whatever one iteration is: then the learner
-                may be asked to export, log and save.
+            pause: To call before every rollout, or other iteration: then the learner may be asked
+                to export, log and save.
 
         Raises:
             DivergedError: If what it learns grows out of all bounds.
@@ -86,10 +86,10 @@ class Learner(Protocol):
         """Write numbers, by name, to a log of the learner's own, if it keeps one."""
 
     def save(self, checkpoint: Path) -> None:
-        """Write all that `restore` needs into a folder, `envs.snapshot()` included."""
+        """Write everything that `restore` needs into a folder, `envs.snapshot()` included."""
 
     def restore(self, checkpoint: Path) -> None:
-        """Go back to what `save` wrote; learning goes on as if it had not been interrupted."""
+        """Go back to what `save` wrote; learning continues as if it had not been interrupted."""
 
 
 Factory = Callable[[TrainingSetup], Learner]

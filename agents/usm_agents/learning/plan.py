@@ -48,8 +48,7 @@ class Plan:
         conditions: Conditions from which scenarios are sampled.
         seed: Seed of everything random, 0 to 4294967295.
         steps: Control periods to train on, over all robots, 1 to 1e12.
-        interval: Steps between checkpoints, at each of which the agent is also validated, 1 to
-            1e12.
+        interval: Steps between checkpoints, at which the agent is also validated, 1 to 1e12.
     """
 
     algorithm: str = "ppo"

@@ -33,7 +33,7 @@ _REPLAY: dict[str, Any] = {
     "gradient_steps": 2,
 }
 # Robots swim side by side. For PPO a rollout is many robots by few steps, so that little time is
-# spent between steps; the others learn after each step of all robots.
+# spent between steps; the others learn after every step of all robots.
 _MANY = {"robots": 256, "reward_scale": REWARD_SCALE}
 _FEW = {"robots": 32, "reward_scale": REWARD_SCALE}
 

@@ -1,6 +1,6 @@
 """Training of an agent on the residual task, from top to bottom.
 
-A training that is interrupted, at whatever instruction, goes on from its last checkpoint as if
+A training that is interrupted, at any instruction, resumes from its last checkpoint as if
 nothing had happened, bit for bit, and ends with the same files (`usm_agents.learning.checkpoint`).
 """
 
@@ -61,7 +61,7 @@ def train(
         plan: What to train.
         folder: Where plan, learning curve, checkpoints and agent are kept.
         report: Called now and then with the steps done and a line on the last validation.
-        resume: Whether to go on with the training in the folder. Its checkpoint is code, which is
+        resume: Whether to continue the training in the folder. Its checkpoint is code, which is
             run; without this, nothing in the folder is opened.
         validation_episodes: On how many held-out scenarios the agent is validated.
         test_episodes: On how many others the best agent is scored in the end.
@@ -70,7 +70,7 @@ def train(
         The learning curve: the validations, as `usm_agents.learning.validation` describes them.
 
     Raises:
-        ValueError: If the folder holds anything of a training and none is to be resumed, or if its
+        ValueError: If the folder holds files of a training but `resume` is not set, or if its
             checkpoint cannot be read.
         DivergedError: If the training diverges; its checkpoints are kept.
         BlockingIOError: If another process trains there.
@@ -104,10 +104,10 @@ def prepare(plan: Plan, folder: Path) -> TrainingSetup:
     episode_seed = int(random.integers(2**31))
     # First episodes of all lengths, so that afterwards the robots are at all times of an episode.
     drawn = [plan.scenario(random) for _ in range(envs.num_envs)]
-    lengths = [float(random.integers(1, int(each.duration) + 1)) for each in drawn]
+    lengths = [float(random.integers(1, int(scenario.duration) + 1)) for scenario in drawn]
     first_episodes = [
-        dataclasses.replace(each, duration=length)
-        for each, length in zip(drawn, lengths, strict=True)
+        dataclasses.replace(scenario, duration=length)
+        for scenario, length in zip(drawn, lengths, strict=True)
     ]
     return TrainingSetup(
         algorithm=plan.algorithm,

@@ -25,14 +25,14 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 
     The base sees the plain observation, as it would alone. Base and residual are added and
     saturated once; what was applied is what the next observation reports, to the base's observer
-    too. A residual of zero gives the base's episode to the bit. Reward, start, end and info are
+    too. A residual of zero gives the base's episode bit for bit. Reward, start, end and info are
     the plain environment's.
 
     ## Action
 
     `Box(-1, 1)` in units of `residual_scale`. "wrench": force in x and y (N, global frame) and
     moment (N m) on the centre of mass, shared out to the thrusters with least norm. "thrusters":
-    force of each thruster (N).
+    forces of the thrusters (N).
 
     ## Observation
 
@@ -109,7 +109,7 @@ class ResidualVectorEnv(
     gym.vector.VectorWrapper,  # generic at run time only since Gymnasium 1.4
     gym.utils.RecordConstructorArgs,
 ):
-    """The residual task of many robots; each behaves as in `ResidualEnv`, to the bit."""
+    """The residual task of many robots; each behaves as in `ResidualEnv`, bit for bit."""
 
     def __init__(
         self,

@@ -20,8 +20,7 @@ from usm_gym.task.observation import ObservationLayout
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# The entries that do not depend on the base, by name: the number of each among them, in the order
-# of the table.
+# The entries that do not depend on the base, by name: their numbers in the order of the table.
 _NAMES = [entry.name for entry in ResidualLayout(thrusters=1, actions=1, base=()).complete]
 ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
 
@@ -30,8 +29,8 @@ class Plain(NamedTuple):
     """How the plain observation is read, see `usm_gym.sensors.value`.
 
     Attributes:
-        starts: First index of each entry.
-        scale: Physical value over observed value of each number.
+        starts: First indices of the entries.
+        scale: Physical value over observed value, by number.
     """
 
     starts: NDArray[np.int64]
@@ -42,11 +41,11 @@ class FrameTable(NamedTuple):
     """The layout of the agent's observation, for the kernel.
 
     Attributes:
-        starts: Where each of `ENTRY` begins in a complete frame.
-        base: Place in it of each shown number of the base's state, and column there, (numbers, 2).
+        starts: Where the entries of `ENTRY` begin in a complete frame.
+        base: Places in it of the base's shown state numbers, and columns there, (numbers, 2).
         shown: Which numbers of a complete frame are shown, in order.
-        scale: Physical value over observed value of each number of the observation.
-        bound: Bound of each observed number, float32.
+        scale: Physical value over observed value, by number of the observation.
+        bound: Bounds of the observed numbers, float32.
         complete: How many numbers a complete frame has.
     """
 
@@ -86,7 +85,7 @@ def add_up(terms):
 
 @piece
 def over_joints(seen, plain, entry, terms):
-    """Sum of a quantity over the joints; `terms` is room for a number of each."""
+    """Sum of a quantity over the joints; `terms` is room for one number per joint."""
     for i in range(terms.size):
         terms[i] = value(seen, plain, entry, i)
     return add_up(terms)
@@ -106,7 +105,7 @@ def tail_over_mean(seen, plain, entry, terms):
 
 @piece
 def fill_axes(frame, starts, signals, estimates, innovation, b):
-    """Fill in what is measured and estimated in each axis."""
+    """Fill in what is measured and estimated, axis by axis."""
     for axis in range(signals.y.shape[1]):
         error, rate, disturbance, thrust = estimates[b, axis]
         frame[starts[ENTRY.position_error] + axis] = signals.y[b, axis]
@@ -234,7 +233,7 @@ class ResidualObserver:
 
         Args:
             signals: What was measured.
-            estimates: (e, v, d, f) of each axis by `Estimator`, (batch, 2, 4).
+            estimates: (e, v, d, f) per axis by `Estimator`, (batch, 2, 4).
             innovation: Its innovations, m, (batch, 2).
             base_action: The base's commands over the limit, not clipped, (batch, thrusters).
             base_state: The base's state after that.

@@ -73,7 +73,7 @@ def correct_all(base_action, allocation, limit, residual, wrench, command):  # t
 
 
 class Residual:
-    """Base policy and residual, for a batch of robots: all that single, vector and policy share.
+    """Base policy and residual, for a batch of robots: what single, vector and policy share.
 
     Attributes:
         nominal: What is known of the robot.
@@ -95,7 +95,7 @@ class Residual:
         Args:
             nominal: What is known of the robot.
             base: The base policy: a name as `--policies` takes it, or the policy itself.
-            residual_scale: Largest residual force in each axis or of each thruster, N, and largest
+            residual_scale: Largest residual force per axis or per thruster, N, and largest
                 residual moment, N m; 1e-6 to 1000.
             action: "wrench" or "thrusters".
             omit: Entries of the observation that the agent is not shown, by name.

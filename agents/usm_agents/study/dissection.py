@@ -33,17 +33,17 @@ Array = NDArray[np.float64]
 
 # Longest shift in time that is tried between two forces, control periods.
 LONGEST_SHIFT = 10
-# Episodes of each agent.
+# Episodes per agent.
 EPISODES = 16
 # Samples of a segment of Welch's method: 0.1 Hz apart at 50 Hz.
 SEGMENT = 500
 
 
 class ForceLog:
-    """A policy that keeps the forces it commands, in each axis of the task, N.
+    """A policy that keeps the forces it commands along the axes of the task, N.
 
     Attributes:
-        total: Commanded force of each step, before saturation, (batch, axes).
+        total: Commanded forces by step, before saturation, (batch, axes).
         base: The base's part of it, where the policy is a base with an agent.
     """
 
@@ -86,8 +86,8 @@ def dissect(policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenar
     limit = scenarios[0].conditions.thruster_limit
     settled = round(scenarios[0].settle_time / nominal.control_period)
     watched = []
-    for each in (policy, policy.base, Oracle(nominal)):
-        log = ForceLog(nominal, each, limit)
+    for actor in (policy, policy.base, Oracle(nominal)):
+        log = ForceLog(nominal, actor, limit)
         rollout(log, scenarios)
         watched.append(log)
     total, alone, needed = (np.stack(log.total)[settled:] for log in watched)
@@ -123,12 +123,12 @@ def shares_of(forces: dict[str, Array], nominal: Nominal) -> ForceShares:
         needed_added=float(shares[1]),
         explained=1.0 - float(left.var() / residual.var()),
         lateness=lateness(forces["both"], needed) * nominal.control_period,
-        spectrum={name: tuple(each.mean(axis=1).tolist()) for name, each in spectra.items()},
+        spectrum={name: tuple(density.mean(axis=1).tolist()) for name, density in spectra.items()},
     )
 
 
 def lateness(force: Array, needed: Array) -> int:
-    """By how many steps a force is best moved back for it to be like the needed one."""
+    """By how many steps a force has to be moved back to match the needed one best."""
     span = range(-LONGEST_SHIFT, LONGEST_SHIFT + 1)
     inner = needed[LONGEST_SHIFT:-LONGEST_SHIFT]
     length = len(inner)
@@ -149,7 +149,7 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
 
 
 def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
-    """What each agent, as its seed 0, does to its base; see `dissect`."""
+    """What the agents, as their seed 0, do to their bases; see `dissect`."""
     made = {}
     for training in chosen:
         if training.name in AGENTS and training.plan.seed == 0:

@@ -59,7 +59,7 @@ def _learned(row: Trained, axis: str) -> tuple[list[float], Any]:
     curves = list(row.curves.values())
     length = min(map(len, curves))
     steps = [point.steps / 1e6 for point in curves[0][:length]]
-    return steps, 1e3 * np.array([[each.errors[axis] for each in c[:length]] for c in curves])
+    return steps, 1e3 * np.array([[point.errors[axis] for point in c[:length]] for c in curves])
 
 
 def _front(study: StudyResult) -> Any:
@@ -72,7 +72,7 @@ def _front(study: StudyResult) -> Any:
         layout="constrained",
     )
     rows: Mapping[str, Trained | Rival] = {**study.agents, **study.rivals}
-    rows = {name: each for name, each in rows.items() if each.mode == MAIN_MODE}
+    rows = {name: row for name, row in rows.items() if row.mode == MAIN_MODE}
     for panel, axis in zip(panels, study.axes, strict=True):
         for number, (name, row) in enumerate(rows.items()):
             scores = row.scores[study.home]
@@ -103,10 +103,10 @@ def _spectra(study: StudyResult) -> Any:
         sharex=True,
         layout="constrained",
     )
-    for panels, (name, each) in zip(grid, study.dissected.items(), strict=True):
-        for panel, (axis, shares) in zip(panels, each.axes.items(), strict=True):
+    for panels, (name, dissection) in zip(grid, study.dissected.items(), strict=True):
+        for panel, (axis, shares) in zip(panels, dissection.axes.items(), strict=True):
             for force, density in shares.spectrum.items():
-                panel.plot(each.frequency[1:], density[1:], label=force)
+                panel.plot(dissection.frequency[1:], density[1:], label=force)
             panel.set(xscale="log", yscale="log", ylabel=f"{name}, {axis} [N²/Hz]")
             panel.grid(alpha=0.3)
     for panel in grid[-1]:

@@ -66,7 +66,7 @@ def markdown(study: StudyResult) -> str:
 
 def table(rows: Mapping[str, Trained | Rival], home: str) -> str:
     """Scores at home; those over seeds, where there are some."""
-    scores = {name: each.scores[home] for name, each in rows.items()}
+    scores = {name: row.scores[home] for name, row in rows.items()}
     first = next(iter(scores.values()))
     several = any(len(row.seed_errors[0].seeds) > 1 for row in scores.values())
     columns = [f"{axis}, mm" for axis in first.axes]
@@ -75,10 +75,10 @@ def table(rows: Mapping[str, Trained | Rival], home: str) -> str:
     lines = _head("policy", [*columns, "variation, N/s", "thrust, N", "lost"])
     for name, row in scores.items():
         errors = row.seed_errors
-        cells = [_length(each.mean, each.ci95) for each in errors]
-        cells += [_length(each.iqm, each.iqm_ci95) for each in errors]
+        cells = [_length(error.mean, error.ci95) for error in errors]
+        cells += [_length(error.iqm, error.iqm_ci95) for error in errors]
         if several:
-            seeds = [each.seeds for each in errors]
+            seeds = [error.seeds for error in errors]
             cells += [str(len(seeds[0])), *(f"{mm(min(m))} to {mm(max(m))}" for m in seeds)]
         cells += [figures(row.metrics[key].mean) for key in ("thrust_variation", "thrust_effort")]
         lines.append(_line([name, *cells, str(row.failures)]))
@@ -88,15 +88,16 @@ def table(rows: Mapping[str, Trained | Rival], home: str) -> str:
 def by_mode(
     agents: Mapping[str, Trained], claims: Mapping[str, Mapping[str, Claim]]
 ) -> list[dict[str, Mapping[str, Claim]]]:
-    """The claims of the agents of each mode."""
-    modes = dict.fromkeys(each.mode for each in agents.values())
+    """The claims of the agents, mode by mode."""
+    modes = dict.fromkeys(agent.mode for agent in agents.values())
     return [
-        {name: claims[name] for name, each in agents.items() if each.mode == mode} for mode in modes
+        {name: claims[name] for name, agent in agents.items() if agent.mode == mode}
+        for mode in modes
     ]
 
 
 def against(claims: Mapping[str, Mapping[str, Claim]]) -> str:
-    """Each agent of a mode against each classical policy."""
+    """The agents of a mode against the classical policies."""
     lines = _head("rival", list(claims))
     for rival in next(iter(claims.values())):
         cells = [rival]
@@ -112,13 +113,13 @@ def against(claims: Mapping[str, Mapping[str, Claim]]) -> str:
 
 
 def soon(agents: Mapping[str, Trained]) -> str:
-    """How soon each agent is as good as each other one becomes."""
+    """How soon every agent is as good as the others become."""
     lines = _head("agent", list(agents))
-    for name, each in agents.items():
+    for name, agent in agents.items():
         cells = [name]
         for other in agents.values():
             error = min(best_so_far(other.curves).values())
-            steps = steps_to(each.curves, error) if other.mode == each.mode else None
+            steps = steps_to(agent.curves, error) if other.mode == agent.mode else None
             cells.append("" if steps is None else f"{steps / 1e6:.2f} M")
         lines.append(_line(cells))
     return "\n".join(lines) + "\n"
@@ -128,10 +129,10 @@ def elsewhere(rows: Mapping[str, Trained | Rival], home: str) -> str:
     """Scores under the other conditions."""
     kinds = [home, *(kind for kind in next(iter(rows.values())).scores if kind != home)]
     lines = _head("policy", kinds)
-    for name, each in rows.items():
+    for name, row in rows.items():
         cells = [name]
         for kind in kinds:
-            scores = each.scores[kind]
+            scores = row.scores[kind]
             lost = f" ({scores.failures})" if scores.failures else ""
             cells.append(" / ".join(mm(error.mean) for error in scores.errors.values()) + lost)
         lines.append(_line(cells))
@@ -139,12 +140,12 @@ def elsewhere(rows: Mapping[str, Trained | Rival], home: str) -> str:
 
 
 def taken(dissected: Mapping[str, Dissection]) -> str:
-    """What each residual is made of."""
+    """What the residuals are made of."""
     forces = ("base alone", "base", "residual", "needed")
     heads = [f"{force}, N" for force in forces]
     lines = _head("agent", [*heads, "excess taken back", "needed added", "explained", "late, ms"])
-    for name, each in dissected.items():
-        axes: Sequence[ForceShares] = list(each.axes.values())
+    for name, dissection in dissected.items():
+        axes: Sequence[ForceShares] = list(dissection.axes.values())
         cells = [_each(figures(axis.deviation[force]) for axis in axes) for force in forces]
         cells.append(_each(f"{axis.excess_taken_back:.2f}" for axis in axes))
         cells.append(_each(f"{axis.needed_added:.2f}" for axis in axes))
@@ -155,7 +156,7 @@ def taken(dissected: Mapping[str, Dissection]) -> str:
 
 
 def commands(study: StudyResult) -> str:
-    """How each training is repeated, as its seed 0."""
+    """How to repeat the trainings, as their seed 0."""
     return "\n".join(f"    {row.command}" for row in study.rows.values()) + "\n"
 
 

@@ -58,12 +58,12 @@ ABLATIONS: dict[str, Plan] = {
     "recurrent-not-kalman": replace(_SHORT, algorithm="recurrent-ppo", omit=KALMAN_STATES),
     "no-joint-references": replace(_SHORT, omit=JOINT_REFERENCES),
     "no-randomisation": replace(_SHORT, conditions=_EXACT),
-    # To be held against residual-sac.
+    # To compare with residual-sac.
     "td3": Plan(algorithm="td3", steps=400_000),
     "tqc": Plan(algorithm="tqc", steps=400_000),
 }
 PLANS = AGENTS | ABLATIONS
-# Seeds of each training at most: more where a small difference is to be told from chance.
+# Most seeds per training: more where a small difference has to be told from chance.
 SEEDS = dict.fromkeys(AGENTS, 5) | dict.fromkeys(ABLATIONS, 1)
 SEEDS |= dict.fromkeys(("reference", "no-joint-references"), 3)
 

@@ -26,7 +26,7 @@ class CurvePoint(Part):
     Attributes:
         steps: After how many steps.
         seconds: After how much time, s.
-        means: Means of the largest error in each axis, m, and of the thrust variation, N/s.
+        means: Means of the largest errors by axis, m, and of the thrust variation, N/s.
         failures: How many episodes lost the robot.
     """
 
@@ -52,7 +52,7 @@ class SeedSummary(MiddleSummary):
     """A metric over the episodes of all seeds.
 
     Attributes:
-        seeds: Mean of each seed.
+        seeds: Means by seed.
     """
 
     order: ClassVar[tuple[str, ...]] = ("mean", "ci95", "iqm", "iqm_ci95", "worst", "seeds")
@@ -64,7 +64,7 @@ class SeedScores(Scores):
     """Scores over the episodes of all seeds.
 
     Attributes:
-        metrics: Summary of each metric.
+        metrics: Summaries by metric.
     """
 
     order: ClassVar[tuple[str, ...]] = ("failures", "per_episode", "metrics")
@@ -72,7 +72,7 @@ class SeedScores(Scores):
 
     @property
     def seed_errors(self) -> list[SeedSummary]:
-        """The largest error in each axis, m."""
+        """The largest errors, one per axis, m."""
         return [self.metrics[MAX_ERROR + axis] for axis in self.axes]
 
 
@@ -115,8 +115,8 @@ class Claim:
     """What an agent is to a classical policy.
 
     Attributes:
-        ratio: Ratio of their means over all seeds, for each axis.
-        ratio_ci95: Its 95 % interval, for each axis.
+        ratio: Ratios of their means over all seeds, by axis.
+        ratio_ci95: Their 95 % intervals, by axis.
         better_in_both: In what share of scenarios the agent, as its seed 0, is better in all axes.
         better_seeds: How many of its seeds are better in the means of all axes.
     """
@@ -132,12 +132,12 @@ class ForceShares:
     """What an agent does to its base in one axis.
 
     Attributes:
-        deviation: Standard deviation of each force, N.
+        deviation: Standard deviations of the forces, N.
         excess_taken_back: Share of what the base commands in excess that the residual takes back.
         needed_added: Share of the needed force that the residual adds.
         explained: Share of the residual's variance that the two explain.
         lateness: By how much the whole force is late behind the needed one, s.
-        spectrum: Power spectral density of each force, N^2/Hz.
+        spectrum: Power spectral densities of the forces, N^2/Hz.
     """
 
     deviation: Mapping[str, Number]
@@ -154,7 +154,7 @@ class Dissection(Part):
 
     Attributes:
         frequency: Frequencies of the spectra, Hz.
-        axes: What it does in each axis.
+        axes: What it does, axis by axis.
     """
 
     beside: ClassVar[str] = "axes"
@@ -172,9 +172,9 @@ class StudyResult(Result):
         seed: Seed of the scenarios.
         rows: Agents and ablations.
         rivals: Classical policies.
-        against: What each agent is to each classical policy of its mode.
+        against: How the agents compare with the classical policies of their mode.
         episodes: How many scenarios there are at home; half as many elsewhere.
-        dissected: What each agent does to its base.
+        dissected: What the agents do to their bases.
         provenance: Where all this comes from.
     """
 
@@ -215,5 +215,5 @@ class StudyResult(Result):
 
     @property
     def ablations(self) -> dict[str, Trained]:
-        """The others, each of which lacks something."""
+        """The others, which lack one thing or another."""
         return {name: row for name, row in self.rows.items() if not row.agent}

@@ -34,7 +34,7 @@ from usm_gym.task.metrics import MAX_ERROR, axes_of
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Mode
 
-# Kept of each episode in each axis, and besides.
+# Kept of every episode, by axis and besides.
 ERRORS, OTHERS = ("max_error", "settled_error"), ("thrust_variation", "thrust_effort")
 
 
@@ -99,7 +99,7 @@ def study(
     episodes: int,
     provenance: Provenance,
 ) -> StudyResult:
-    """A row for each agent and ablation over its seeds, and one for each rival."""
+    """One row per agent and ablation over its seeds, and one per rival."""
     rows: dict[str, Trained] = {}
     sets = [HOME, *TRANSFER]
     for name in dict.fromkeys(training.name for training in chosen):
@@ -115,8 +115,8 @@ def study(
             mode=plan.mode,
             base=plan.base,
             command=plan.command(name),
-            curves={str(each.plan.seed): each.curve for each in its},
-            scores={kind: over_seeds(each) for kind, each in parts.items()},
+            curves={str(training.plan.seed): training.curve for training in its},
+            scores={kind: over_seeds(seeds) for kind, seeds in parts.items()},
         )
     modes: dict[Mode, None] = dict.fromkeys(training.plan.mode for training in chosen)
     others = {
@@ -169,12 +169,12 @@ def claims(rows: Mapping[str, Trained], rivals: Mapping[str, Rival]) -> dict[str
     """What agents are to the classical policies of their mode at home, scenario by scenario."""
     return {
         name: {
-            rival: against(each.scores[HOME], other.scores[HOME])
+            rival: against(row.scores[HOME], other.scores[HOME])
             for rival, other in rivals.items()
-            if other.mode == each.mode
+            if other.mode == row.mode
         }
-        for name, each in rows.items()
-        if each.agent
+        for name, row in rows.items()
+        if row.agent
     }
 
 
@@ -201,9 +201,9 @@ def best_so_far(curves: Mapping[str, Sequence[CurvePoint]]) -> dict[int, float]:
     """By steps: validated error of the best agent so far, the median over the seeds, m."""
     errors = [np.minimum.accumulate([point.total for point in curve]) for curve in curves.values()]
     points = zip(next(iter(curves.values())), zip(*errors, strict=False), strict=False)
-    return {point.steps: float(np.median(each)) for point, each in points}
+    return {point.steps: float(np.median(totals)) for point, totals in points}
 
 
 def steps_to(curves: Mapping[str, Sequence[CurvePoint]], error: float) -> int | None:
     """After how many steps the best agents so far are as good as that; see `best_so_far`."""
-    return next((steps for steps, each in best_so_far(curves).items() if each <= error), None)
+    return next((steps for steps, best in best_so_far(curves).items() if best <= error), None)

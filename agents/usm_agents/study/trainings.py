@@ -77,13 +77,13 @@ _CURVE = TypeAdapter(Annotated[tuple[CurvePoint, ...], Field(min_length=1)])
 def planned(
     names: Sequence[str], seeds: int, folder: Path, steps: int | None = None
 ) -> list[StudyTraining]:
-    """The trainings of the study, seed by seed, so that an early stop leaves some of each.
+    """The trainings of the study, seed by seed, so that an early stop leaves some of all.
 
     Args:
         names: Names of agents and ablations.
-        seeds: How many seeds, from 0 on, and no more than `SEEDS` of each.
+        seeds: How many seeds, from 0 on, and per name no more than in `SEEDS`.
         folder: Folder of the study.
-        steps: How many steps each is trained; without it, as its plan says.
+        steps: How many steps a training takes; without it, as its plan says.
 
     Raises:
         ValueError: If a name is unknown.
@@ -102,9 +102,9 @@ def planned(
 def train_all(
     chosen: Sequence[StudyTraining], workers: int, report: Callable[[StudyTraining], object]
 ) -> None:
-    """Train what is not trained yet; an interrupted training goes on where it was.
+    """Train what is not trained yet; an interrupted training resumes.
 
-    Only a training of the very plan goes on: its checkpoint is code, which is run.
+    Only a training of the very same plan resumes: its checkpoint is code, which is run.
 
     Raises:
         ValueError: If a folder holds another training; then none has begun.
@@ -125,11 +125,11 @@ def train_one(training: StudyTraining) -> None:
 
 
 def ship(chosen: Sequence[StudyTraining], folder: Path, command: str) -> None:
-    """Put each agent, as its seed 0, under its own name into a folder.
+    """Put every agent, as its seed 0, under its own name into a folder.
 
     Args:
         chosen: The trainings.
-        folder: Where; each agent has a folder of its own there.
+        folder: Where; every agent has a folder of its own there.
         command: The command of the study.
     """
     for training in chosen:

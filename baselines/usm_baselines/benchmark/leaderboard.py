@@ -63,7 +63,7 @@ class Standing(CompetitorScores):
     """A row of the leaderboard.
 
     Attributes:
-        metrics: Summary of each metric, for the largest errors with the middle half.
+        metrics: Summaries by metric, for the largest errors with the middle half.
         beats_next: Its lead over the next row; None before a row that is no competitor, and last.
     """
 
@@ -77,8 +77,8 @@ class Standing(CompetitorScores):
 
     @property
     def middle(self) -> list[MiddleSummary]:
-        """The largest error in each axis, m."""
-        return [each for each in self.errors.values() if isinstance(each, MiddleSummary)]
+        """The largest errors, one per axis, m."""
+        return [error for error in self.errors.values() if isinstance(error, MiddleSummary)]
 
 
 @validated
@@ -86,7 +86,7 @@ class FrontPoint(Part):
     """A point of error against thrust variation.
 
     Attributes:
-        means: Means of the largest error in each axis, m, and of the thrust variation, N/s.
+        means: Means of the largest errors by axis, m, and of the thrust variation, N/s.
     """
 
     beside: ClassVar[str] = "means"
@@ -166,7 +166,8 @@ def suites() -> dict[str, list[Scenario]]:
     """The frozen suites, and the control row: the main one with the joints still."""
     chosen = {name: suite(name) for name in NAMES}
     chosen[STILL] = [
-        replace(each, conditions=replace(each.conditions, motion=False)) for each in chosen[MAIN]
+        replace(scenario, conditions=replace(scenario.conditions, motion=False))
+        for scenario in chosen[MAIN]
     ]
     return chosen
 
@@ -184,7 +185,7 @@ def front() -> dict[str, list[Contender]]:
         row = weighted.setdefault(gains.policy, [])
         row.append((gains.weight, contender(f"{gains.policy}@{file}")))
     return {
-        id: [each for _, each in sorted(row, key=lambda pair: pair[0])]
+        id: [policy for _, policy in sorted(row, key=lambda pair: pair[0])]
         for id, row in weighted.items()
     }
 
@@ -199,9 +200,9 @@ def places(
     listed = []
     for name, scenarios in chosen.items():
         nominal = shared_nominal(scenarios)
-        besides = [each for row in fronts.values() for each in row] if name == MAIN else []
-        for each in (*contenders, *besides):
-            listed.append(Place(name, Job(each, tuple(scenarios), nominal, time_limit)))
+        besides = [policy for row in fronts.values() for policy in row] if name == MAIN else []
+        for policy in (*contenders, *besides):
+            listed.append(Place(name, Job(policy, tuple(scenarios), nominal, time_limit)))
     return listed
 
 
@@ -226,7 +227,7 @@ def leaderboard(
             scores.setdefault(place.suite, {})[contender.name] = contender, outcome
     main = scores.get(MAIN, {})
     points = {
-        id: [point(main.pop(each.name)[1]) for each in row if each.name in main]
+        id: [point(main.pop(policy.name)[1]) for policy in row if policy.name in main]
         for id, row in fronts.items()
     }
     suites = {name: ranked(list(pairs.values())) for name, pairs in scores.items() if pairs}

@@ -40,7 +40,7 @@ def draw_all(result: LeaderboardResult, folder: Path) -> None:
 
 
 def _errors(result: LeaderboardResult) -> Any:
-    """Mean error of each policy on each suite, with its interval."""
+    """Mean error of every policy on every suite, with its interval."""
     from matplotlib import pyplot as plt
 
     names, axes = list(result.main), result.axes
@@ -104,8 +104,8 @@ def _variation(result: LeaderboardResult) -> Any:
                 panel.plot(variation, error, marker, color=color, linestyle="none", label=name)
         for name, points in result.front.items():
             panel.plot(
-                [each.thrust_variation for each in points],
-                [1e3 * each.errors[axis] for each in points],
+                [point.thrust_variation for point in points],
+                [1e3 * point.errors[axis] for point in points],
                 ".-",
                 color="0.5",
                 linewidth=1,

@@ -34,8 +34,8 @@ def table(rows: Mapping[str, Standing]) -> str:
     lines = _head([*columns, "thrust, N", "variation, N/s", "lost", "beats the next"])
     for id, row in rows.items():
         errors = row.errors.values()
-        cells = [_mean(each) for each in errors]
-        cells += [mm(each.iqm) for each in row.middle] + [mm(each.worst) for each in errors]
+        cells = [_mean(error) for error in errors]
+        cells += [mm(error.iqm) for error in row.middle] + [mm(error.worst) for error in errors]
         cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
         lead = row.beats_next
         decision = "" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})"
@@ -44,7 +44,7 @@ def table(rows: Mapping[str, Standing]) -> str:
 
 
 def brief_table(rows: Mapping[str, Standing]) -> str:
-    """The README's table: of each law the better gains, and the paper's, in fewer columns."""
+    """The README's table: every law with its better gains, and the paper's, in fewer columns."""
     axes = axes_in(rows.values())
     columns = [*(f"{axis}, mm" for axis in axes), f"worst {' / '.join(axes)}"]
     lines = _head([*columns, "variation, N/s", "lost"])
@@ -55,7 +55,7 @@ def brief_table(rows: Mapping[str, Standing]) -> str:
             continue
         laws.add(law)
         errors = row.errors.values()
-        worst = " / ".join(mm(each.worst) for each in errors)
+        worst = " / ".join(mm(error.worst) for error in errors)
         variation = figures(row.metrics["thrust_variation"].mean)
         cells = [*map(_mean, errors), worst, variation, str(row.failures)]
         lines.append(_line(id, row, cells))
@@ -101,7 +101,7 @@ def with_table(page: str, result: LeaderboardResult) -> str:
 
 
 def csv_text(result: LeaderboardResult) -> str:
-    """One line for each policy on each suite; errors in m, thrust in N, variation in N/s."""
+    """One line per policy and suite; errors in m, thrust in N, variation in N/s."""
     scores = [name for name in next(iter(result.main.values())).metrics if name not in NO_COLUMN]
     head = ["suite", "policy", "competitor", "failures"]
     for name in scores:

@@ -51,9 +51,9 @@ class Scores(Part):
     """Scores of a policy over episodes.
 
     Attributes:
-        metrics: Summary of each metric; in JSON they stand beside the other fields.
+        metrics: Summaries by metric; in JSON they stand beside the other fields.
         failures: How many episodes lost the robot.
-        per_episode: What is kept of each episode, by metric.
+        per_episode: What is kept of the episodes, by metric.
     """
 
     beside: ClassVar[str] = "metrics"
@@ -73,7 +73,7 @@ class Scores(Part):
             kept = list(self.per_episode)
             require(MAX_ERROR + axis in kept, "per_episode", kept, f"also {MAX_ERROR}{axis}")
         counts = sorted({len(values) for values in self.per_episode.values()})
-        require(len(counts) == 1 and counts[0] > 0, "episodes", counts, "the same for each metric")
+        require(len(counts) == 1 and counts[0] > 0, "episodes", counts, "the same for all metrics")
 
     @classmethod
     def of(cls, summary: Mapping[str, Any], **fields: Any) -> Self:
@@ -98,7 +98,7 @@ class Scores(Part):
     @property
     def total(self) -> float:
         """What policies are ranked by: the mean errors of all axes, added up, m."""
-        return float(total_error({name: each.mean for name, each in self.metrics.items()}))
+        return float(total_error({name: summary.mean for name, summary in self.metrics.items()}))
 
     def by_axis(self, metric: str) -> dict[str, Summary]:
         """The summary of a metric such as "settled_error", by axis."""

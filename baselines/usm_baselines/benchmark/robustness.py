@@ -51,14 +51,14 @@ def condition(field: str, scale: float = 1.0) -> Callable[[Scenario, float], Sce
 def speed(scenario: Scenario, factor: float) -> Scenario:
     """Filters the joint references more or less."""
     frequency = scenario.inspection.filter_frequency
-    require(frequency is not None, "filter_frequency", frequency, "a number, for it to be varied")
+    require(frequency is not None, "filter_frequency", frequency, "a number that can be varied")
     motion = replace(scenario.inspection, filter_frequency=factor * (frequency or 0.0))
     return replace(scenario, inspection=motion)
 
 
 def amplitude(scenario: Scenario, factor: float) -> Scenario:
     """Bends the head more or less."""
-    deflections = tuple(factor * each for each in scenario.inspection.deflections)
+    deflections = tuple(factor * angle for angle in scenario.inspection.deflections)
     return replace(scenario, inspection=replace(scenario.inspection, deflections=deflections))
 
 
@@ -151,7 +151,7 @@ class RobustnessResult(Result):
         label: What it is, with its unit.
         values: Its values.
         scenarios: The scenarios before anything is varied.
-        results: For each policy a point at each value.
+        results: Curves by policy: a point at every value.
         provenance: Where all this comes from.
     """
 
@@ -198,17 +198,17 @@ def jobs(
     values: Sequence[float],
     time_limit: float = TIME_LIMIT,
 ) -> list[Job]:
-    """One job for each policy and value, values of one policy side by side."""
+    """One job per policy and value, all values of a policy one after the other."""
     nominal = shared_nominal(scenarios)
-    varied = [tuple(quantity.vary(each, value) for each in scenarios) for value in values]
+    varied = [tuple(quantity.vary(scenario, value) for scenario in scenarios) for value in values]
     return [
         Job(
-            each,
+            policy,
             batch,
             replace(nominal, control_period=batch[0].conditions.control_period),
             time_limit,
         )
-        for each in contenders
+        for policy in contenders
         for batch in varied
     ]
 
@@ -216,7 +216,7 @@ def jobs(
 def curves(
     names: Sequence[str], values: Sequence[float], outcomes: Sequence[Evaluation | Refusal]
 ) -> dict[str, tuple[ScoredPoint | RefusedPoint, ...]]:
-    """For each policy its scores at each value, or why there are none."""
+    """By policy, its scores at all values, or why there are none."""
     points = [
         RefusedPoint(value=value, refused=outcome.reason)
         if isinstance(outcome, Refusal)
@@ -228,7 +228,7 @@ def curves(
 
 
 def draw(result: RobustnessResult) -> Any:
-    """Draw the errors in each axis against the quantity, with their intervals, by matplotlib."""
+    """Draw the errors axis by axis against the quantity, with their intervals, by matplotlib."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -240,9 +240,9 @@ def draw(result: RobustnessResult) -> Any:
     )
     for panel, axis in zip(panels, result.axes, strict=False):
         for number, (name, points) in enumerate(result.results.items()):
-            scored = [each for each in points if isinstance(each, ScoredPoint)]
-            errors = [each.errors[axis] for each in scored]
-            places = [each.value for each in scored]
+            scored = [point for point in points if isinstance(point, ScoredPoint)]
+            errors = [point.errors[axis] for point in scored]
+            places = [point.value for point in scored]
             colour = f"C{number % 10}"
             panel.plot(places, [1e3 * e.mean for e in errors], ".-", color=colour, label=name)
             low, high = ([1e3 * e.ci95[side] for e in errors] for side in (0, 1))

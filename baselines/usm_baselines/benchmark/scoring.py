@@ -78,7 +78,7 @@ class Job:
 
     @property
     def key(self) -> str | None:
-        """A hash of all that the scores depend on; None where that is not known."""
+        """A hash of everything that the scores depend on; None where that is not known."""
         if self.contender.identity is None:
             return None
         parts = [

@@ -2,8 +2,8 @@
 
 The scenarios come from the stream TUNING of a seed, and the check afterwards from the stream
 VALIDATION; nothing here can reach a frozen suite. Trials are asked for in rounds of a fixed size
-and the sampler is seeded anew for each, so that the result is the same for any number of workers
-and for a tuning that was interrupted.
+and the sampler is seeded anew for every round, so that the result is the same for any number of
+workers and for a tuning that was interrupted.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Problem:
         """Name of the study: another problem, or other code, never continues it."""
         identity = registered(self.policy, entry(self.policy)).identity
         parts = {**dataclasses.asdict(self), "budget": self.budget.episodes, "code": identity}
-        parts["space"] = {name: dataclasses.asdict(each) for name, each in self.space.items()}
+        parts["space"] = {name: dataclasses.asdict(span) for name, span in self.space.items()}
         text = json.dumps(parts, sort_keys=True)
         return f"{self.policy}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
@@ -180,7 +180,9 @@ def tune(
     if value >= FAILED:
         raise UsageError(f"no trial of {problem.policy} has a score: {reason}")
     checks = [problem.job(gains, VALIDATION) for gains in ({}, best)]
-    start, validation = (objective(each, problem.weight) for each in score_all(checks, workers))
+    start, validation = (
+        objective(outcome, problem.weight) for outcome in score_all(checks, workers)
+    )
     return Optimum(best, value, start, validation, pruned)
 
 
@@ -241,8 +243,8 @@ def _search(
 def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
     """Ask for trials, score them on the first scenarios, the better ones on all, and tell."""
     space: dict[str, BaseDistribution] = {
-        name: FloatDistribution(each.low, each.high, log=each.log)
-        for name, each in problem.space.items()
+        name: FloatDistribution(span.low, span.high, log=span.log)
+        for name, span in problem.space.items()
     }
     trials = [study.ask(space) for _ in range(size)]
     jobs = [problem.job(trial.params, TUNING) for trial in trials]
@@ -299,8 +301,8 @@ def _start(problem: Problem) -> dict[str, float]:
     gains = getattr(job.contender.make(job.nominal), "gains", None)
     own = {} if gains is None else gains._asdict()
     return {
-        name: min(max(own[name], each.low), each.high)
-        for name, each in problem.space.items()
+        name: min(max(own[name], span.low), span.high)
+        for name, span in problem.space.items()
         if name in own
     }
 

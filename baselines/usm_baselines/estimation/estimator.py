@@ -55,7 +55,7 @@ class Estimator:
             start: Where an episode starts, (batch,).
 
         Returns:
-            What was measured and applied; (e, v, d, f) of each axis in m, m/s, m/s^2 and m/s^2,
+            What was measured and applied; (e, v, d, f) per axis in m, m/s, m/s^2 and m/s^2,
             (batch, 2, 4); innovations, m, (batch, 2); and the state for the next call.
         """
         size = len(observation)

@@ -47,8 +47,8 @@ class NominalPlant(NamedTuple):
         plant: What the plant's kernels take.
         row: The numbers of a robot that do not change, (rows,).
         frequency: Assumed frequency of the joint references' filter, rad/s.
-        starts: First index of each entry of the observation.
-        scale: Physical value over observed value of each number.
+        starts: First indices of the observation's entries.
+        scale: Physical value over observed value, by number.
         h: Control period, s.
     """
 

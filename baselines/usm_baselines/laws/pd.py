@@ -37,7 +37,7 @@ class PDGains(NamedTuple):
     heading_gain: float = HEADING_GAIN
 
 
-# Where the gains of each reading are tuned.
+# Where the gains are tuned, by reading.
 SPACES: dict[Reading, Space] = {
     "force": space_of(PDGains),
     "mass": space_of(

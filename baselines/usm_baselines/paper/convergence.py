@@ -121,8 +121,8 @@ def switches() -> list[tuple[float, float]]:
 def growth(rate: float, exponent: float) -> float:
     """How many times larger the observer error becomes under the worst of `switches`.
 
-    The equations (17) are homogeneous: whether an error shrinks does not hang on its size, and one
-    start tells of all.
+    The equations (17) are homogeneous: whether an error shrinks does not depend on its size, and
+    one start tells of all.
 
     Args:
         rate: |F'|, m/s^3.

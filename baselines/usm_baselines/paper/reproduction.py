@@ -82,7 +82,7 @@ class Declaration(Part):
     """What is declared beside the paper.
 
     Attributes:
-        scenarios: The scenario of each mode; in JSON they stand beside the other fields.
+        scenarios: Scenarios by mode; in JSON they stand beside the other fields.
         heading_gain: Gain of the heading, N m/rad.
         sigma_start: Sliding variable at the start, m/s.
         implicit_step: Step of the row "sta-implicit", s.
@@ -103,7 +103,7 @@ class ReproductionResult(Result):
         step: Step of plant and laws, s.
         settle_time: From when on errors count, s.
         rows: Our errors by row, part and axis, m.
-        thrust_effort: Mean thrust of each row in each mode, N.
+        thrust_effort: Mean thrust by row and mode, N.
         paper: The paper's errors, m.
         scenario: What is declared.
         provenance: Where all this comes from.
@@ -127,7 +127,7 @@ class ReproductionResult(Result):
             known = dict.fromkeys(PARTS, self.axes)
             require(parts == known and self.axes, f"parts of {name}", parts, f"{known}")
         parts_printed = [part for row in self.paper.values() for part in row.values()]
-        printed = [each for part in parts_printed for each in part.values()]
+        printed = [error for part in parts_printed for error in part.values()]
         require(all(printed), "paper", printed, "errors other than 0")
 
     @property
@@ -164,7 +164,7 @@ def velocity_start(
 
 
 def laws(scenario: Scenario) -> dict[str, Law]:
-    """The laws of Table 1, "sta" and "pd", with all that is declared."""
+    """The laws of Table 1, "sta" and "pd", as declared."""
     law = Law(
         super_twisting=SuperTwistingGains(heading_gain=HEADING_GAIN),
         pd=PDGains(heading_gain=HEADING_GAIN),

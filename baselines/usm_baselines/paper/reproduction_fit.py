@@ -68,7 +68,7 @@ class Assessment:
 
     Attributes:
         step: The step, s.
-        numbers: The numbers that the fit sees, by law and part, one for each axis, m.
+        numbers: The numbers that the fit sees, by law and part, one per axis, m.
         residual: How far they are from the paper's.
     """
 
@@ -175,7 +175,7 @@ def scenario_of(freedoms: Freedoms, mode: Mode, step: float) -> Scenario:
 
 
 def numbers(freedoms: Freedoms, step: float, implicit: bool) -> Numbers:
-    """The numbers that the fit sees, one for each axis, m; `LOST_ERROR` where the robot is lost."""
+    """The numbers that the fit sees, one per axis, m; `LOST_ERROR` where the robot is lost."""
     errors: dict[tuple[str, Mode], Mapping[str, Mapping[str, float]] | None] = {}
     for row, mode in dict.fromkeys((row, PARTS[part]) for row, part in SEEN):
         scenario = scenario_of(freedoms, mode, step)
@@ -291,8 +291,8 @@ class Search:
     def _scored(self, pool: ThreadPoolExecutor, candidates: list[Array]) -> list[float]:
         """The residuals of a generation; the file then holds them, too."""
         fresh = [x for x in candidates if tuple(x) not in self._scores]
-        for x, each in zip(fresh, pool.map(self._score, fresh), strict=True):
-            self._scores[tuple(x)] = each
+        for x, residual in zip(fresh, pool.map(self._score, fresh), strict=True):
+            self._scores[tuple(x)] = residual
         if fresh:
             FitProgress(evaluations=self.evaluations, provenance=self.origin).write(self._path)
         self._done += len(candidates)

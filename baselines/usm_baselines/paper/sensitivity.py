@@ -1,4 +1,4 @@
-"""The open items of the paper one at a time, and what each does to the numbers of Table 1."""
+"""The open items of the paper one at a time, and their effect on the numbers of Table 1."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ SENSORS_AND_THRUSTERS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Variation:
-    """What is changed in the declared scenario and laws, as fields of each.
+    """What is changed in the declared scenario and laws, field by field.
 
     Attributes:
         conditions: Fields of the conditions.
@@ -137,7 +137,7 @@ class TrialResult:
         row: The law, "sta" or "pd".
         mode: "operation" or "torpedo".
         scenario: The scenario.
-        law: The law with all that is changed.
+        law: The law with the changes made.
         result: The outcome; None where the robot was lost.
     """
 
@@ -178,7 +178,7 @@ class SensitivityResult(Result):
 
 
 def variations() -> dict[str, dict[str, Variation]]:
-    """The open items, and what is put in the place of each; the first is the declaration itself."""
+    """The open items, and what takes their place; the first is the declaration itself."""
     water = named("table1", "operation").water
     normal_drag = replace(water, coefficients=(1.0, 0.5, 1.0, 1.0, 1.0, 1.0))
     return {
@@ -306,18 +306,18 @@ def study(
     planned = [planned_result(trial) for trial in chosen]
     known = stored(path, origin)
     todo = {
-        each.key: trial.case
-        for trial, each in zip(chosen, planned, strict=True)
-        if each.key not in known
+        run.key: trial.case
+        for trial, run in zip(chosen, planned, strict=True)
+        if run.key not in known
     }
     total, done = sum(map(cost, todo.values())), 0
 
     def finished() -> SensitivityResult:
-        runs = (replace(each, result=known[each.key]) for each in planned if each.key in known)
+        runs = (replace(run, result=known[run.key]) for run in planned if run.key in known)
         return SensitivityResult(runs=tuple(runs), provenance=origin)
 
     # The longest first, so that no thread is left with one at the end.
-    ordered = sorted(todo, key=lambda each: -cost(todo[each]))
+    ordered = sorted(todo, key=lambda key: -cost(todo[key]))
     for key, result in side_by_side(outcome, {key: todo[key] for key in ordered}, workers):
         known[key] = result
         finished().write(path)

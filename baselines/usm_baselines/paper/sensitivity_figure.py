@@ -47,7 +47,7 @@ def draw_study(study: SensitivityResult, path: Path) -> None:
 
 
 class Sheet:
-    """The panels of the page; each draws into axes of matplotlib."""
+    """The panels of the page, drawn into axes of matplotlib."""
 
     def __init__(self, study: SensitivityResult) -> None:
         """Draw a study."""
@@ -62,7 +62,7 @@ class Sheet:
         return float("nan") if outcome is None else outcome.errors[part][axis]
 
     def numbers(self, panel: Any) -> None:
-        """All numbers of the table under each variation."""
+        """All numbers of the table under all variations."""
         columns = [(row, part, axis) for row in ROWS for part in PARTS for axis in self._axes]
         table = [(item, value) for item, values in variations().items() for value in values]
         numbers = np.array(
@@ -112,7 +112,7 @@ class Sheet:
         names = ["stepped", *(value.replace("filter, ", "") for value in filters)]
         for row, marker in zip(ROWS, "os", strict=True):
             for index, axis in enumerate(self._axes):
-                errors = [self.error((*each, row), "operation", axis) for each in keys]
+                errors = [self.error((*key, row), "operation", axis) for key in keys]
                 panel.plot(
                     1e3 * np.array(errors),
                     marker=marker,
@@ -141,16 +141,16 @@ class Sheet:
             ("PD in (19)", "PD", "in (19)", "pd"),
         ]
         names = [name for name, *_ in shown]
-        keys = [(item, value, row) for _, item, value, row in shown]
+        runs = [(item, value, row) for _, item, value, row in shown]
         place = np.arange(len(shown))
         count = len(self._axes)
         width = 0.75 / (count + 1)
         left = place - width * count / 2
         for index, axis in enumerate(self._axes):
-            errors = 1e3 * np.array([self.error(each, "operation", axis) for each in keys])
+            errors = 1e3 * np.array([self.error(run, "operation", axis) for run in runs])
             panel.bar(left + width * index, errors, width, label=f"peak, {axis}")
-        outcomes = [self._outcomes[*each, "operation"] for each in keys]
-        effort = [np.nan if each is None else each.thrust_effort for each in outcomes]
+        outcomes = [self._outcomes[*run, "operation"] for run in runs]
+        effort = [np.nan if outcome is None else outcome.thrust_effort for outcome in outcomes]
         panel.bar(left + width * count, effort, width, color="0.6", label="mean |thrust| [N]")
         panel.set_xticks(place, names)
         panel.tick_params(axis="x", labelsize=8)

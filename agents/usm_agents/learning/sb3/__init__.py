@@ -1,1 +1,1 @@
-"""Stable-Baselines3 as the learner: all that imports torch."""
+"""Stable-Baselines3 as the learner: the only part that imports torch."""

@@ -47,7 +47,9 @@ class SB3Learner:
         first, self._started = not self._started, True
         if first:
             self._vec_env.seed(self._setup.episode_seed)
-            self._vec_env.set_options([{"scenario": each} for each in self._setup.first_episodes])
+            self._vec_env.set_options(
+                [{"scenario": episode} for episode in self._setup.first_episodes]
+            )
         self._model.set_logger(configure(str(self._setup.folder), ["tensorboard"]))
 
         def before_rollout() -> None:
@@ -101,11 +103,11 @@ class SB3Learner:
         self._started = True
 
     def _check(self) -> None:
-        check_weights(each.detach().numpy() for each in self._model.policy.parameters())
+        check_weights(weight.detach().numpy() for weight in self._model.policy.parameters())
 
 
 class BeforeRollout(BaseCallback):
-    """Calls a function before each rollout."""
+    """Calls a function before every rollout."""
 
     def __init__(self, function: Callable[[], None]) -> None:
         """Take the function."""

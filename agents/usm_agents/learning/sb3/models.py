@@ -1,4 +1,4 @@
-"""Models of Stable-Baselines3 for the residual task, and the network that acts in each."""
+"""Models of Stable-Baselines3 for the residual task, and the networks that act in them."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def network_of(algorithm: str, model: Any) -> Network:
 
 
 def _recurrence(lstm: nn.LSTM) -> Recurrence:
-    given, kept, one, other = (each.detach().numpy() for each in lstm.parameters())
+    given, kept, one, other = (weight.detach().numpy() for weight in lstm.parameters())
     return Recurrence(given.T.copy(), kept.T.copy(), one + other)
 
 

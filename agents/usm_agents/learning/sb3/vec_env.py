@@ -64,7 +64,7 @@ class SB3VecEnv(VecEnv):
     def reset(self) -> np.ndarray[Any, Any]:
         """Start all episodes, with the seeds of `seed` and the options of `set_options`, if any."""
         scenarios = [options.get("scenario") for options in self._options]
-        seed = self._seeds if any(each is not None for each in self._seeds) else None
+        seed = self._seeds if any(value is not None for value in self._seeds) else None
         observations, infos = self._envs.reset(seed=seed, options={"scenario": scenarios})
         self.reset_infos = [_info_of(infos, index) for index in range(self.num_envs)]
         self._reset_seeds()
@@ -85,9 +85,9 @@ class SB3VecEnv(VecEnv):
         self._returns += rewards
         self._lengths += 1
         done = terminated | truncated
-        each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        robot_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for index in np.flatnonzero(done).tolist():
-            each[index] = {
+            robot_infos[index] = {
                 **_info_of(infos["final_info"], index),
                 "terminal_observation": infos["final_obs"][index],
                 "TimeLimit.truncated": bool(truncated[index]),
@@ -99,7 +99,7 @@ class SB3VecEnv(VecEnv):
             }
         self._returns[done] = 0.0
         self._lengths[done] = 0
-        return observations, (self._reward_scale * rewards).astype(np.float32), done, each
+        return observations, (self._reward_scale * rewards).astype(np.float32), done, robot_infos
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy the whole state."""
@@ -116,7 +116,7 @@ class SB3VecEnv(VecEnv):
         self._envs.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The environment's attribute, once for each robot asked for."""
+        """The environment's attribute, once per robot asked for."""
         return [getattr(self._envs.unwrapped, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
@@ -133,7 +133,7 @@ class SB3VecEnv(VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Call the environment's method once; its answer, once for each robot asked for."""
+        """Call the environment's method once; its answer, once per robot asked for."""
         answer = getattr(self._envs.unwrapped, method_name)(*method_args, **method_kwargs)
         return [answer for _ in self._get_indices(indices)]
 
@@ -144,7 +144,7 @@ class SB3VecEnv(VecEnv):
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[np.ndarray[Any, Any] | None]:
-        """An image of each robot, or none without the render mode "rgb_array"."""
+        """Images of all robots, or none without the render mode "rgb_array"."""
         return list(self._envs.render() or ())
 
 
