@@ -41,6 +41,7 @@ def without_times(value):
     return [without_times(each) for each in value] if isinstance(value, list) else value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stops", [(0,), (1500,), (1100, 1100, 3000)])
 def test_it_goes_on_as_if_it_had_not_been_stopped(stops, tmp_path):
     train(PLAN, tmp_path / "whole", silent, **SMALL)
@@ -93,6 +94,7 @@ def as_lists(value):
     return list(map(as_lists, value)) if isinstance(value, list | tuple | np.ndarray) else value
 
 
+@pytest.mark.slow
 def test_the_truth_reaches_the_learner_and_nobody_else(tmp_path, monkeypatch):
     told, networks = [], []
     for force in (1.5, -2.5):
