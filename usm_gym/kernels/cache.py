@@ -1,8 +1,7 @@
 """Keeps the machine code of kernels.
 
-The folder of a kernel is named after a hash of its sources: the file of the kernel and the files of
-all modules that it imports, directly or not. numba's own cache looks only at the kernel's file and
-would serve stale code after an edit of a helper.
+The folder of a kernel is named after a hash of all that its machine code is made from. numba's own
+cache looks only at the kernel's file and would serve stale code after an edit of a helper.
 
 numba's cache consists of pickles, so anyone who can write in its folder can run code as the user.
 """
@@ -11,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 import stat
 import sys
 import tempfile
@@ -19,20 +17,19 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
-from importlib.util import resolve_name
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numba
+import numpy as np
 import platformdirs
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-# The imports at the top of a module: what is imported, or from where which names.
-IMPORT = re.compile(
-    r"^(?:import +([\w.]+)|from +([\w.]+) +import +(?:\(([^)]*)\)|([^#\n]+)))", re.MULTILINE
-)
-# Packages that have kernels or parts of them: an edit in one of them matters to what imports it.
+# Packages that have parts of kernels. Functions of others that kernels call are numba's business.
 _packages: set[str] = set()
+# Every kernel depends on how kernels are compiled and kept.
+_HERE = (Path(__file__), Path(__file__).with_name("compile.py"))
 
 
 def notice(function: Callable[..., Any]) -> None:
@@ -43,8 +40,8 @@ def notice(function: Callable[..., Any]) -> None:
 def keep(kernel: Any, function: Callable[..., Any]) -> None:
     """Let a kernel look for its machine code in the folder of its sources, and leave it there."""
     notice(function)
-    file = Path(function.__code__.co_filename).resolve()
-    folder = cache_folder(sources(file, function.__module__)) if file.exists() else None
+    file = Path(function.__code__.co_filename)
+    folder = cache_folder(fingerprint(function)) if file.exists() else None
     if folder is not None:
         # numba asks for the cache folder here; the user's own setting is put back.
         previous = numba.config.CACHE_DIR
@@ -55,38 +52,54 @@ def keep(kernel: Any, function: Callable[..., Any]) -> None:
             numba.config.CACHE_DIR = previous
 
 
-def sources(file: Path, module: str) -> frozenset[Path]:
-    """The files of a module and of all our modules that it imports, directly or not.
+def fingerprint(function: Any) -> str:
+    """A hash of all that the machine code of a kernel is made from.
 
-    Ours are the modules of packages that have kernels, and those in the folder of the file.
+    These are the files of the functions that it calls, directly or not, and the constants that
+    these use, wherever they were imported from.
     """
-    files, waiting = {file}, [(file, module)]
+    files, constants = set(_HERE), set()
+    known, waiting = {function}, [function]
     while waiting:
-        for name, imported in imports(*waiting.pop()):
-            ours = name.partition(".")[0] in _packages or imported.parent == file.parent
-            if ours and imported not in files:
-                files.add(imported)
-                waiting.append((imported, name))
-    return frozenset(files)
+        current = waiting.pop()
+        files.add(Path(current.__code__.co_filename))
+        for name, value in _used(current):
+            value = getattr(value, "py_func", value)
+            if isinstance(value, FunctionType | type):
+                if value.__module__.partition(".")[0] not in _packages:
+                    continue
+                if isinstance(value, type):  # a named tuple
+                    files.add(Path(str(sys.modules[value.__module__].__file__)))
+                elif value not in known:
+                    known.add(value)
+                    waiting.append(value)
+            elif isinstance(value, np.ndarray):
+                constants.add(f"{name} {value.dtype} {value.shape} {value.tobytes().hex()}")
+            elif isinstance(value, bool | int | float | complex | str | tuple):
+                constants.add(f"{name} {value!r}")
+    parts = [*map(digest, files), *constants]
+    return hashlib.sha256("\n".join(sorted(parts)).encode()).hexdigest()
 
 
-@cache
-def imports(file: Path, module: str) -> tuple[tuple[str, Path], ...]:
-    """Names and files of the modules that the top of a module imports.
+def _used(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    """What a function uses, by name: globals, attributes of modules, what it closes over."""
+    code = function.__code__
+    cells = zip(code.co_freevars, function.__closure__ or (), strict=True)
+    yield from ((name, cell.cell_contents) for name, cell in cells)
+    names = set(_names(code))
+    for name in names & function.__globals__.keys():
+        value = function.__globals__[name]
+        yield name, value
+        if isinstance(value, ModuleType):
+            yield from ((other, vars(value)[other]) for other in names & vars(value).keys())
 
-    Of `from package import name`, this is the module `package.name` if there is one, else `package`
-    itself: importing a module of a package does not depend on everything that the package imports.
-    """
-    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    names: set[str] = set()
-    for whole, origin, inside, line in IMPORT.findall(file.read_text(encoding="utf-8")):
-        if origin:
-            origin = resolve_name(origin, package or None)
-        listed = [word.split(" as ")[0].strip() for word in (inside or line).split(",")]
-        parts = {f"{origin}.{word}" for word in listed if word}
-        names |= {name if name in sys.modules else origin for name in parts} | {whole}
-    files = ((name, getattr(sys.modules.get(name), "__file__", None)) for name in sorted(names))
-    return tuple((name, Path(known).resolve()) for name, known in files if known is not None)
+
+def _names(code: CodeType) -> Iterator[str]:
+    """The names in a function's code, and in that of functions within it."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
 
 
 @cache
@@ -96,18 +109,18 @@ def digest(file: Path) -> str:
 
 
 @cache
-def cache_folder(files: frozenset[Path]) -> str | None:
-    """Find a writable folder for machine code that is made from some files.
+def cache_folder(name: str) -> str | None:
+    """Find a writable folder for machine code that is made from what a fingerprint tells.
 
-    The first choice is `NUMBA_CACHE_DIR`, if it is set, then the user's cache folder, then a folder
-    in the temporary directory.
+    `NUMBA_CACHE_DIR` is used where it is set, then the user's cache folder, then a folder of the
+    user's in the temporary directory.
 
     Returns:
-        The folder, or None after a warning: kernels are then compiled again in every process.
+        The folder, or None after a warning if there is none: kernels then compile anew in each
+        process.
     """
-    fingerprint = hashlib.sha256(" ".join(sorted(map(digest, files))).encode()).hexdigest()
     for base in _bases():
-        folder = base / fingerprint[:16]
+        folder = base / name[:16]
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if not _owned(folder):

@@ -145,6 +145,34 @@ def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     assert [run(OWN, **environment)[0] for _ in range(2)] == ["1 6.0", "0 6.0"]
     (tmp_path / "my_laws" / "parts" / "gains.py").write_text("GAIN = 4.0\n")
     assert run(OWN, **environment) == ["1 8.0"]
+    # What no kernel uses recompiles none.
+    (tmp_path / "my_laws" / "parts" / "gains.py").write_text("# a comment\nGAIN = 4.0\nOTHER = 1\n")
+    (tmp_path / "my_laws" / "parts" / "__init__.py").write_text("import os\n")
+    assert run(OWN, **environment) == ["0 8.0"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "imported",
+    [
+        "import os, constants\nGAIN = constants.GAIN",
+        "if True:\n    from constants import GAIN",
+        "from constants import (  # a comment)\n    GAIN,\n)",
+        "import sys; from constants import \\\n    GAIN",
+        "from constants import *",
+        "import constants as c",
+    ],
+)
+def test_a_constant_of_any_package_is_noticed_however_it_is_imported(imported, tmp_path):
+    gain = "c.GAIN" if imported.endswith("c") else "GAIN"
+    law = f"{imported}\nfrom usm_gym.kernels.compile import compiled\n\n\n"
+    (tmp_path / "law.py").write_text(
+        f"{law}@compiled\ndef force(x):\n    return {gain} * x\n\n\nprint(force(2.0))\n"
+    )
+    environment = {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
+    for value in (3.0, 4.0):
+        (tmp_path / "constants.py").write_text(f"GAIN = {value}\n")
+        assert run("import law", **environment) == [str(2.0 * value)]
 
 
 SHARED = """
@@ -206,7 +234,7 @@ def test_without_a_writable_folder_kernels_work_after_a_warning(fresh, monkeypat
 def test_an_unwritable_home_falls_back_to_the_temporary_directory(tmp_path):
     nowhere = tmp_path / "file"
     nowhere.write_text("no folder")
-    code = "from usm_gym.kernels.cache import cache_folder; print(cache_folder(frozenset()))"
+    code = "from usm_gym.kernels.cache import cache_folder; print(cache_folder('0123'))"
     environment = {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "TMPDIR": tmp_path}
     assert run(code, **environment, NUMBA_CACHE_DIR="")[0].startswith(str(tmp_path))
 
@@ -261,7 +289,7 @@ only_posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="owners and mo
 
 @only_posix
 def test_a_cache_in_the_shared_temporary_folder_is_the_users_alone(temporary):
-    folder = Path(cache.cache_folder(frozenset()))
+    folder = Path(cache.cache_folder("0123"))
     assert folder.parent == temporary / f"usm-gym-{os.getuid()}"
     for each in (folder, folder.parent):
         assert each.stat().st_mode & 0o777 == 0o700
@@ -285,12 +313,12 @@ def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_
     elif trap == "not sticky":
         temporary.chmod(0o777)
     elif trap == "link to a cache":
-        name = Path(cache.cache_folder(frozenset())).name
+        name = Path(cache.cache_folder("0123")).name
         cache.cache_folder.cache_clear()
         (base / name).rmdir()
         (base / name).symlink_to(elsewhere)
     elif trap == "writable cache":
-        name = Path(cache.cache_folder(frozenset())).name
+        name = Path(cache.cache_folder("0123")).name
         cache.cache_folder.cache_clear()
         (base / name).chmod(0o777)
     else:
@@ -304,7 +332,7 @@ def test_a_trap_in_the_shared_temporary_folder_is_not_used(trap, temporary, tmp_
 
         monkeypatch.setattr(Path, "lstat", other)
     with pytest.warns(UserWarning, match="no safe and writable cache folder") as caught:
-        folders = [cache.cache_folder.__wrapped__(frozenset()) for _ in range(2)]
+        folders = [cache.cache_folder.__wrapped__("0123") for _ in range(2)]
     assert folders == [None, None]
     assert len(caught) == 1
     assert list(elsewhere.iterdir()) == []
