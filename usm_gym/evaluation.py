@@ -18,7 +18,6 @@ from usm_gym.statistics import mean_interval
 from usm_gym.support import parallel
 from usm_gym.support.validation import is_whole, require
 from usm_gym.task import metrics
-from usm_gym.task.loss import LOST_ERROR
 from usm_gym.world import World, world_of
 
 # Episodes that a policy meets side by side; a multiple of the plant's lanes.
@@ -192,7 +191,7 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
     names = metric_names(world)[: len(POSITION_METRICS) * len(world.axes)]
     row: dict[str, float | bool]
     if trajectory.lost:
-        row = dict.fromkeys(names, max(LOST_ERROR, float(np.abs(error).max())))
+        row = dict.fromkeys(names, max(world.lost_error, float(np.abs(error).max())))
         counted = np.ones(len(time), bool)
     else:
         values = [

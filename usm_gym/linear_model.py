@@ -175,7 +175,7 @@ def _differences(simulation: Simulation) -> tuple[Array, Array]:
     thrusters, quantities = simulation.world.thrusters, simulation.world.quantities
     row, start = simulation.fleet.blocks[0], simulation.snapshot()
     names = ("position", "theta", "velocity", "theta_dot", "force")
-    place = np.concatenate([quantities[name] for name in names])
+    place = np.r_[tuple(quantities[name] for name in names)]
 
     def after(deviation: Array) -> Array:
         simulation.restore(start)

@@ -29,9 +29,9 @@ from usm_gym.world import Array, Kernels, World, world_of
 MOST_LINK_STEPS = 2_000_000_000
 
 
-@piece
+@compiled
 def observe(fleet, plant, table, robot, lanes):
-    """Measure one robot."""
+    """Measure one robot; not a `piece`, which would slow down what it is inlined in."""
     measure(
         fleet.blocks[robot // lanes],
         lanes,
@@ -67,12 +67,6 @@ def run(fleet, plant, table, actions, like, lanes, stride, first, last):
 
 
 @compiled
-def observe_one(fleet, plant, table, robot, lanes):
-    """Measure one robot outside a control period: at the start of its episode."""
-    observe(fleet, plant, table, robot, lanes)
-
-
-@compiled
 def run_singles(fleet, plant, table, actions, first, last):
     """`run` for blocks of one robot each."""
     run(fleet, plant, table, actions, 0.0, 1, WIDTH, first, last)
@@ -102,7 +96,7 @@ class PlanarWorld(World):
     robot: Robot
     axes: ClassVar[tuple[str, ...]] = ("x", "y")
     attitude: ClassVar[tuple[str, ...]] = ("heading",)
-    kernels: ClassVar[Kernels] = Kernels(observe_one, run_singles, run_lanes, run_threads)
+    kernels: ClassVar[Kernels] = Kernels(observe, run_singles, run_lanes, run_threads)
 
     @cached_property
     def layout(self) -> ObservationLayout:
@@ -130,7 +124,7 @@ class PlanarWorld(World):
         return self._guidance + guidance.GUIDANCE_ROWS
 
     @cached_property
-    def quantities(self) -> Mapping[str, NDArray[np.int64]]:
+    def quantities(self) -> Mapping[str, slice]:
         """Rows by name; vectors in the global frame, angles from the tail, SI units.
 
         `position`, `velocity` and `acceleration` are those of the centre of mass, `force` has the
@@ -153,7 +147,7 @@ class PlanarWorld(World):
             "command": (first, self.thrusters),
             "force": (first + self.thrusters, self.thrusters),
         }
-        return {name: np.arange(row, row + size) for name, (row, size) in starts.items()}
+        return {name: slice(row, row + size) for name, (row, size) in starts.items()}
 
     def check(self, scenario: Scenario) -> None:
         """Refuse a scenario that the robot cannot swim.

@@ -58,5 +58,7 @@ def as_action(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """
     array = real_array("action", action)
     require(array.shape == shape, "the action's shape", array.shape, f"{shape}")
+    if array.dtype == np.float32:
+        return array
     with np.errstate(over="ignore"):  # infinity saturates like any number beyond the limit
         return np.asarray(array, np.float32)

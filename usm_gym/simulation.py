@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from usm_gym.kernels.lanes import WIDTH
 from usm_gym.support.validation import require
-from usm_gym.task.loss import is_lost, make_finite
+from usm_gym.task.loss import make_finite
 from usm_gym.task.metrics import TIME_TOLERANCE
 from usm_gym.world import Array, Episode, Fleet, world_of
 
@@ -108,7 +108,7 @@ class Simulation:
             A copy, (size, numbers).
         """
         rows = self._rows[:, self.world.quantities[quantity]]
-        return np.swapaxes(rows, 1, 2).reshape(-1, rows.shape[1])[: self.size]
+        return rows.swapaxes(1, 2).reshape(-1, rows.shape[1])[: self.size].copy()
 
     def check(self, scenario: Any) -> None:
         """Refuse a scenario that `start` would refuse.
@@ -176,13 +176,12 @@ class Simulation:
         else:
             run = kernels.run_lanes if self._lanes > 1 else kernels.run
             run(*arguments, 0, len(self._rows))
-        self.lost[:] = is_lost(self.error, self.attitude_error)
-        if self.lost.any():
+        if self.world.find_lost(self.error, self.attitude_error, self.lost):
             # What is reported of a lost robot is finite, its observation inside its bounds.
             bound, lost = self.layout.bound, self.lost
             self.observation[lost] = np.clip(np.nan_to_num(self.observation[lost]), -bound, bound)
             for errors in (self.error, self.max_error, self.attitude_error):
-                make_finite(errors, lost)
+                make_finite(errors, lost, self.world.lost_error)
 
     def snapshot(self) -> Snapshot:
         """Copy the whole state."""

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from usm_gym.sensors import Layout
 from usm_gym.task.conditions import Conditions
+from usm_gym.task.loss import LOST_ERROR, find_lost
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.reward import reward, reward_of_loss
 
 Array = NDArray[np.float64]
 
@@ -140,8 +142,10 @@ class World(ABC):
         attitude: Names of the angles of the attitude error; their errors are observed as
             `ANGLE_error`.
         kernels: The compiled entry points.
+        lost_error: Further from its reference than this in any axis a robot is lost, m.
     """
 
+    lost_error: ClassVar[float] = LOST_ERROR
     axes: ClassVar[tuple[str, ...]]
     attitude: ClassVar[tuple[str, ...]] = ()
     kernels: ClassVar[Kernels]
@@ -168,7 +172,7 @@ class World(ABC):
 
     @property
     @abstractmethod
-    def quantities(self) -> Mapping[str, NDArray[np.int64]]:
+    def quantities(self) -> Mapping[str, slice]:
         """Rows of the quantities that may be read, by name; `limit`, N, and `command`, N, too."""
 
     @property
@@ -195,6 +199,34 @@ class World(ABC):
             scenario: A scenario that starts.
             previous: What was shared so far, which is returned if it will do; None at first.
         """
+
+    def find_lost(self, error: Array, attitude_error: Array, lost: NDArray[np.bool_]) -> bool:
+        """Write down which robots are lost, (size,), and say whether any is.
+
+        Args:
+            error: True position errors, m, (size, axes).
+            attitude_error: Attitude errors, rad, (size, angles).
+            lost: Where to write.
+        """
+        return bool(find_lost(error, attitude_error, self.lost_error, lost))
+
+    def reward(self, error: Array, effort: Array, limit: Array) -> Array:
+        """Rewards of a step, (size,).
+
+        Args:
+            error: True position errors, m, (size, axes).
+            effort: Mean absolute thruster commands after saturation, N, (size,).
+            limit: Thruster limits, N, (size,).
+        """
+        return reward(error, effort, limit)
+
+    def reward_of_loss(self, remaining: NDArray[np.int64]) -> Array:
+        """Rewards of the steps that lose robots, (lost,).
+
+        Args:
+            remaining: Control periods that were left of their episodes, (lost,).
+        """
+        return reward_of_loss(remaining)
 
     def truth(self, read: Callable[[str], Array]) -> dict[str, Array]:
         """What training may be told and no policy: true parameters and signals, by name.

@@ -136,16 +136,22 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
     forces, wrench, work = np.empty(model.thrusters), np.empty(rows), np.empty((2 * rows + 1, rows))
     for b in range(observation.shape[0]):
         seen, T = observation[b], allocation[b]
-        wrench[: model.axes] = force[b]
+        for axis in range(model.axes):
+            wrench[axis] = force[b, axis]
         for i in range(model.angles):
             angle_error = physical(seen, model, model.attitude_error + i)
             wrench[model.axes + i] = -attitude_gain * angle_error
-        allocate(T, wrench, rows, work, forces)
+        # Of three rows the compiler unrolls the loops.
+        if rows == 3:
+            allocate(T, wrench, 3, work, forces)
+        else:
+            allocate(T, wrench, rows, work, forces)
         limit = physical(seen, model, model.thruster_limit)
         state[b, 0] = 1.0
         for j in range(model.thrusters):
             action[b, j] = forces[j] / limit
-            for axis in range(model.axes):
+        for axis in range(model.axes):
+            for j in range(model.thrusters):
                 state[b, 1 + axis * model.thrusters + j] = T[axis, j]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import gymnasium as gym
@@ -17,7 +18,6 @@ from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.support.validation import is_whole, require
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.reward import reward, reward_of_loss
 from usm_gym.world import Sampler, World, world_of
 
 Observation = NDArray[np.float32]
@@ -193,29 +193,36 @@ def scenario_of(
     known = isinstance(options, Mapping) and set(options) <= {"scenario"}
     require(known, "options", options, "a dict with the key scenario")
     wanted = options.get("scenario")
-    return sampler.draw(stream) if wanted is None else sampler.choose(wanted)
+    if wanted is None:
+        return sampler.draw(stream)
+    scenario = sampler.choose(wanted)
+    allowed = "one of the environment's robot"
+    require(getattr(scenario, "body", None) == sampler.body, "scenario", wanted, allowed)
+    return scenario
 
 
 def outcome(
     simulation: Simulation,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Rewards, terminations and truncations of the step just made, all (size,)."""
+    """Rewards, terminations and truncations of the step just made, (size,) each."""
+    world, lost = simulation.world, simulation.lost
     remaining = simulation.steps - simulation.count
-    lost = simulation.lost
-    rewards = reward(simulation.error, simulation.effort, simulation.limit)
+    rewards = world.reward(simulation.error, simulation.effort, simulation.limit)
     if lost.any():
-        rewards[lost] = reward_of_loss(remaining[lost])
+        rewards[lost] = world.reward_of_loss(remaining[lost])
     return rewards, lost.copy(), (remaining <= 0) & ~lost
+
+
+@cache
+def info_keys(axes: tuple[str, ...], attitude: tuple[str, ...]) -> tuple[str, ...]:
+    """The keys of an info."""
+    errors = [f"{kind}_{axis}" for kind in ("error", "max_error") for axis in axes]
+    return (*errors, *(f"{angle}_error" for angle in attitude), "thrust_effort", "diverged")
 
 
 def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
     """The info of every robot: float64, (size,), some of them views of the simulation's."""
-    world = simulation.world
-    values: dict[str, NDArray[Any]] = {}
-    for kind, errors in (("error", simulation.error), ("max_error", simulation.max_error)):
-        values |= {f"{kind}_{axis}": errors[:, k] for k, axis in enumerate(world.axes)}
-    for k, angle in enumerate(world.attitude):
-        values[f"{angle}_error"] = simulation.attitude_error[:, k]
-    values["thrust_effort"] = simulation.effort
-    values["diverged"] = simulation.lost.astype(np.float64)
-    return values
+    values = (*simulation.error.T, *simulation.max_error.T, *simulation.attitude_error.T)
+    own = (simulation.effort, simulation.lost.astype(np.float64))
+    keys = info_keys(simulation.world.axes, simulation.world.attitude)
+    return dict(zip(keys, (*values, *own), strict=True))

@@ -25,6 +25,11 @@ def compiled(function: F) -> F:
     return _kernel(function)
 
 
+def watchful(function: F) -> F:
+    """Compile a kernel as `compiled` does, but for numbers that may be infinite or none at all."""
+    return _kernel(function, fastmath=False)
+
+
 def parallel(function: F) -> F:
     """Compile a kernel as `compiled` does; its loops over `numba.prange` are shared by threads."""
     return _kernel(function, parallel=True)
@@ -45,8 +50,8 @@ def shared(function: F) -> F:
 
 
 def _kernel(function: F, **options: Any) -> F:
-    options |= {"fastmath": FLAGS, "error_model": "numpy", "nogil": True}
-    kernel: Any = numba.njit(**options)(function)
+    usual = {"fastmath": FLAGS, "error_model": "numpy", "nogil": True}
+    kernel: Any = numba.njit(**usual | options)(function)
     keep(kernel, function)
     kept: F = kernel
     return kept
