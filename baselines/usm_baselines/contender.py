@@ -29,6 +29,8 @@ from usm_gym.policy import Policy
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.nominal import Nominal
 
+# For what code of ours is refused. Whatever else it raises is a bug of ours.
+OUR_REFUSALS = (ValueError, ArithmeticError, TimeoutError)
 PREDICT = "predict(observation, state=None, episode_start=None, deterministic=True)"
 
 
@@ -49,6 +51,11 @@ class Contender:
     privileged: bool = False
     identity: str | None = None
 
+    @property
+    def refusals(self) -> tuple[type[BaseException], ...]:
+        """For what the policy is refused; the code of others is, whatever it raises."""
+        return (Exception, SystemExit) if self.identity is None else OUR_REFUSALS
+
     def make(self, nominal: Nominal) -> Policy:
         """Make the policy.
 
@@ -57,7 +64,7 @@ class Contender:
         """
         try:
             policy: Policy = self.factory(nominal)
-        except Exception as error:
+        except self.refusals as error:
             fault = f"{type(error).__name__}: {in_one_line(error)}"
             raise UsageError(f"policy {self.name} cannot be made: {fault}") from error
         predict = getattr(policy, "predict", None)

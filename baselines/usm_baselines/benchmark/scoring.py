@@ -157,7 +157,7 @@ def score_batch(job: Job, first: int, last: int) -> Evaluation | Refusal:
         if job.contender.identity is None:  # ours are never refused for a slow machine
             policy = Timed(policy, job.time_limit)
         return evaluate(policy, scenarios)
-    except (Exception, SystemExit) as error:  # whatever a controller may do
+    except job.contender.refusals as error:
         kind = "" if isinstance(error, ValueError | TimeoutError) else f"{type(error).__name__}: "
         return Refusal(kind + in_one_line(error))
 
