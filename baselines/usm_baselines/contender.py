@@ -25,7 +25,7 @@ from typing import Any
 
 from usm_baselines.gains import read_gains
 from usm_baselines.registry import Registration, entry, tuned
-from usm_gym.policy import Policy
+from usm_gym.policy import Policy, is_privileged
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.nominal import Nominal
 
@@ -60,7 +60,8 @@ class Contender:
         """Make the policy.
 
         Raises:
-            ValueError: If it cannot be made, or has no `predict` of the kind that is called.
+            ValueError: If it cannot be made, has no `predict` of the kind that is called, or is
+                given true state although the contender does not say so.
         """
         try:
             policy: Policy = self.factory(nominal)
@@ -70,6 +71,12 @@ class Contender:
         predict = getattr(policy, "predict", None)
         require(
             callable(predict), f"policy {self.name}", type(policy).__name__, f"one with {PREDICT}"
+        )
+        require(
+            is_privileged(policy) == self.privileged,
+            f"privileged of policy {self.name}",
+            is_privileged(policy),
+            f"{self.privileged}, as its class or factory has it",
         )
         try:
             inspect.signature(policy.predict).bind(None, None, None, deterministic=True)
@@ -91,7 +98,9 @@ def contender(name: str) -> Contender:
         require(file.policy == id, f"policy of {path}", file.policy, id)
         return registered(name, tuned(file))
     if ":" in name:
-        return Contender(name, own(name))
+        factory = own(name)
+        privileged = getattr(factory, "privileged", False) is True
+        return Contender(name, partial(call, factory), privileged)
     return registered(name, entry(name))
 
 
@@ -111,7 +120,7 @@ def registered(name: str, entry: Registration) -> Contender:
     return Contender(name, entry.factory, entry.privileged, identity)
 
 
-def own(name: str) -> Callable[[Nominal], Any]:
+def own(name: str) -> Callable[..., Any]:
     """The factory `module:attribute`, which takes the nominal knowledge or nothing.
 
     Modules are looked for in the current folder, too, but there last: a folder that is named like
@@ -132,7 +141,8 @@ def own(name: str) -> Callable[[Nominal], Any]:
         attribute,
         f"a class or factory in {path}{_made(module)}",
     )
-    return partial(call, factory)
+    chosen: Callable[..., Any] = factory
+    return chosen
 
 
 def call(factory: Callable[..., Any], nominal: Nominal) -> Any:
