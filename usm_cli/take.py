@@ -71,7 +71,7 @@ def take(
     policy = contender.make(scenario.nominal)
     try:
         (trajectory,) = rollout(policy, [scenario], progress, watch)
-    except (Exception, SystemExit) as error:  # a foreign controller may raise anything
+    except contender.refusals as error:
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         raise UsageError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
     end = max(seen)

@@ -149,9 +149,9 @@ def evaluate(
     )
 
 
-def batches(episodes: int, workers: int = 1) -> list[slice]:
+def batches(episodes: int, workers: int = 1, batch: int = BATCH) -> list[slice]:
     """Which episodes a policy meets side by side: a batch, or a worker's share if that is less."""
-    size = min(BATCH, -(-episodes // workers))
+    size = min(batch, -(-episodes // workers))
     return [slice(first, min(first + size, episodes)) for first in range(0, episodes, size)]
 
 

@@ -25,10 +25,12 @@ from typing import Any
 
 from usm_baselines.gains import read_gains
 from usm_baselines.registry import Registration, entry, tuned
-from usm_gym.policy import Policy
+from usm_gym.policy import Policy, is_privileged
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.nominal import Nominal
 
+# For what code of ours is refused. Whatever else it raises is a bug of ours.
+OUR_REFUSALS = (ValueError, ArithmeticError, TimeoutError)
 PREDICT = "predict(observation, state=None, episode_start=None, deterministic=True)"
 
 
@@ -49,20 +51,32 @@ class Contender:
     privileged: bool = False
     identity: str | None = None
 
+    @property
+    def refusals(self) -> tuple[type[BaseException], ...]:
+        """For what the policy is refused; the code of others is, whatever it raises."""
+        return (Exception, SystemExit) if self.identity is None else OUR_REFUSALS
+
     def make(self, nominal: Nominal) -> Policy:
         """Make the policy.
 
         Raises:
-            ValueError: If it cannot be made, or has no `predict` of the kind that is called.
+            ValueError: If it cannot be made, has no `predict` of the kind that is called, or is
+                given true state although the contender does not say so.
         """
         try:
             policy: Policy = self.factory(nominal)
-        except Exception as error:
+        except self.refusals as error:
             fault = f"{type(error).__name__}: {in_one_line(error)}"
             raise UsageError(f"policy {self.name} cannot be made: {fault}") from error
         predict = getattr(policy, "predict", None)
         require(
             callable(predict), f"policy {self.name}", type(policy).__name__, f"one with {PREDICT}"
+        )
+        require(
+            is_privileged(policy) == self.privileged,
+            f"privileged of policy {self.name}",
+            is_privileged(policy),
+            f"{self.privileged}, as its class or factory has it",
         )
         try:
             inspect.signature(policy.predict).bind(None, None, None, deterministic=True)
@@ -84,7 +98,9 @@ def contender(name: str) -> Contender:
         require(file.policy == id, f"policy of {path}", file.policy, id)
         return registered(name, tuned(file))
     if ":" in name:
-        return Contender(name, own(name))
+        factory = own(name)
+        privileged = getattr(factory, "privileged", False) is True
+        return Contender(name, partial(call, factory), privileged)
     return registered(name, entry(name))
 
 
@@ -104,7 +120,7 @@ def registered(name: str, entry: Registration) -> Contender:
     return Contender(name, entry.factory, entry.privileged, identity)
 
 
-def own(name: str) -> Callable[[Nominal], Any]:
+def own(name: str) -> Callable[..., Any]:
     """The factory `module:attribute`, which takes the nominal knowledge or nothing.
 
     Modules are looked for in the current folder, too, but there last: a folder that is named like
@@ -125,7 +141,8 @@ def own(name: str) -> Callable[[Nominal], Any]:
         attribute,
         f"a class or factory in {path}{_made(module)}",
     )
-    return partial(call, factory)
+    chosen: Callable[..., Any] = factory
+    return chosen
 
 
 def call(factory: Callable[..., Any], nominal: Nominal) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,7 +26,7 @@ from usm_baselines.laws.zero import Zero
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.space import Space, space_of
 from usm_gym.policy import Policy
-from usm_gym.support.validation import require
+from usm_gym.support.validation import UsageError, require
 from usm_gym.task.nominal import Nominal
 
 
@@ -84,19 +85,38 @@ def register(
 
 
 def _declared_space(factory: Any) -> Space:
+    law = _law_of(factory)
+    return {} if law is None else space_of(law.Gains)
+
+
+def _law_of(factory: Any) -> type[ScriptedPolicy] | None:
     while isinstance(factory, partial):
         factory = factory.func
     law = isinstance(factory, type) and issubclass(factory, ScriptedPolicy)
-    return space_of(factory.Gains) if law else {}
+    return factory if law else None
+
+
+def _require_gains(file: GainsFile, factory: Callable[..., Policy]) -> None:
+    """Refuse a file with gains that its policy does not have."""
+    law = _law_of(factory)
+    if law is not None:
+        names = law.Gains._fields
+        unknown = ", ".join(name for name in file.gains if name not in names)
+        require(not unknown, f"gains of {file.policy}", unknown, ", ".join(names))
+    try:
+        inspect.signature(factory).bind(None, **file.gains)
+    except TypeError as error:
+        raise UsageError(f"gains of {file.policy}: {error}") from error
 
 
 def tuned(file: GainsFile) -> Registration:
     """The registered policy that a file of gains is for, with these gains.
 
     Raises:
-        ValueError: If there is no such policy.
+        ValueError: If there is no such policy, or it does not have one of the gains.
     """
     base, budget = entry(file.policy), file.budget
+    _require_gains(file, base.factory)
     return Registration(
         partial(base.factory, **file.gains),
         f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",

@@ -12,6 +12,7 @@ from support.episodes import short
 from usm_baselines.contender import contender
 
 import usm_gym
+from usm_gym.policy import is_privileged
 from usm_gym.task.sampling import named
 
 NOMINAL = named("nominal", "operation").nominal
@@ -30,6 +31,11 @@ class Needy(Plain):
         self.nominal = knowledge
 def factory():
     return Plain(7.0)
+class Seer(Plain):
+    privileged = True
+class SecretSeer(Plain):
+    def __init__(self):
+        self.privileged = True
 class Mute: ...
 class Short(Plain):
     def predict(self, observation): ...
@@ -85,6 +91,12 @@ def test_a_controller_of_ones_own_is_given_the_nominal_knowledge_if_it_asks(mine
     assert make("factory").gain == 7.0
 
 
+def test_a_controller_of_ones_own_that_is_given_true_state_is_no_competitor(mine: str) -> None:
+    seer, plain = contender(f"{mine}:Seer"), contender(f"{mine}:Plain")
+    assert (seer.privileged, plain.privileged) == (True, False)
+    assert is_privileged(seer.make(NOMINAL))
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -95,6 +107,7 @@ def test_a_controller_of_ones_own_is_given_the_nominal_knowledge_if_it_asks(mine
         ("faulty:Mute", "predict(observation, state=None"),
         ("faulty:Short", "too many positional arguments"),
         ("faulty:Broken", "cannot be made: OSError: no weights"),
+        ("faulty:SecretSeer", "privileged of policy faulty:SecretSeer is True; allowed: False"),
         ("sta@pd.json", "policy of pd.json is 'pd'; allowed: sta"),
         ("sta@wrong.json", "wrong.json is no file of gains"),
         ("sta@odd.json", "odd.json is no file of gains"),

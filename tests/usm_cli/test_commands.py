@@ -12,7 +12,8 @@ import pytest
 from support.interrupts import listening
 
 from usm_cli.commands import policies
-from usm_cli.program import main
+from usm_cli.program import BUG, main
+from usm_gym.simulation import Simulation
 
 USM = Path(sys.executable).with_name("usm")
 
@@ -218,6 +219,10 @@ class Zero:
 class Leaving(Zero):
     def predict(self, *arguments, **options):
         os._exit(3)
+
+class Slipping(Zero):
+    def predict(self, *arguments, **options):
+        return self.gain
 """
 
 
@@ -263,7 +268,35 @@ def test_a_bug_is_a_traceback_and_status_1(monkeypatch, capsys):
     *lines, last = capsys.readouterr().err.splitlines()
     assert lines[0] == "Traceback (most recent call last):"
     assert lines[-1] == "ValueError: a slip of ours"
-    assert last == "usm: this is a bug in usm-gym; please report it with the lines above"
+    assert last == BUG
+
+
+def test_a_bug_below_a_policy_of_ours_is_no_refusal(monkeypatch, tmp_path, capsys):
+    def slip(self, action):
+        raise AttributeError("a slip of ours")
+
+    monkeypatch.setattr(Simulation, "step", slip)
+    chosen = ["--policies", "sta", "--suite", str(small_suite(tmp_path))]
+    with pytest.raises(SystemExit) as left:
+        main(["evaluate", *chosen])
+    assert left.value.code == 1
+    *_, error, last = capsys.readouterr().err.splitlines()
+    assert error == "AttributeError: a slip of ours"
+    assert last == BUG
+
+
+def test_a_slip_in_a_controller_of_ones_own_is_a_refusal(monkeypatch, tmp_path, capsys):
+    (tmp_path / "slipping.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    chosen = ["--policies", "zero,slipping:Slipping", "--suite", str(small_suite(tmp_path))]
+    with pytest.raises(SystemExit) as left:
+        main(["evaluate", *chosen, "--output", "result.json"])
+    assert left.value.code == 1
+    reason = "AttributeError: 'Slipping' object has no attribute 'gain'"
+    assert capsys.readouterr().err == f"usm: slipping:Slipping is refused: {reason}\n"
+    result = json.loads(Path("result.json").read_text())
+    assert (list(result["results"]), result["refused"]) == (["zero"], {"slipping:Slipping": reason})
 
 
 @pytest.mark.parametrize(

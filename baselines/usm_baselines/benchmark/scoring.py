@@ -24,7 +24,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from usm_baselines.contender import Contender
-from usm_gym.evaluation import BATCH, Evaluation, evaluate, joined, metric_names
+from usm_gym.evaluation import BATCH, Evaluation, batches, evaluate, joined, metric_names
 from usm_gym.policy import Policy, is_privileged, nominal_of
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
@@ -124,8 +124,8 @@ def score_all(
     """
     require(workers >= 1, "workers", workers, "1 or more")
     outcomes: dict[int, Evaluation | Refusal] = {}
-    batches: list[tuple[Job, int, int]] = []
-    waiting: dict[int, dict[int, Evaluation | Refusal]] = {}
+    tasks: list[tuple[Job, slice]] = []
+    waiting: dict[int, list[Evaluation | Refusal | None]] = {}
     places = []
     for index, job in enumerate(jobs):
         known = _read(cache, job)
@@ -133,31 +133,31 @@ def score_all(
             outcomes[index] = known
             progress(len(job.scenarios))
             continue
-        waiting[index] = {}
-        for first in range(0, len(job.scenarios), batch):
-            batches.append((job, first, first + batch))
-            places.append(index)
-    for number, outcome in parallel.results(score_batch, batches, workers):
-        job, first, last = batches[number]
-        index = places[number]
-        parts = waiting[index]
-        parts[first] = outcome
-        progress(len(job.scenarios[first:last]))
-        if len(parts) == len(range(0, len(job.scenarios), batch)):
-            outcomes[index] = _whole([parts[first] for first in sorted(parts)])
+        parts = batches(len(job.scenarios), batch=batch)
+        tasks += [(job, part) for part in parts]
+        places += [(index, place) for place in range(len(parts))]
+        waiting[index] = [None] * len(parts)
+    for number, outcome in parallel.results(score_batch, tasks, workers):
+        job, part = tasks[number]
+        index, place = places[number]
+        waiting[index][place] = outcome
+        progress(len(job.scenarios[part]))
+        done = [each for each in waiting[index] if each is not None]
+        if len(done) == len(waiting[index]):
+            outcomes[index] = _whole(done)
             _write(cache, job, outcomes[index])
     return [outcomes[index] for index in range(len(jobs))]
 
 
-def score_batch(job: Job, first: int, last: int) -> Evaluation | Refusal:
-    """Score the episodes `first` to `last`, this one left out, of a job side by side."""
-    scenarios = job.scenarios[first:last]
+def score_batch(job: Job, part: slice) -> Evaluation | Refusal:
+    """Score a part of the episodes of a job side by side."""
+    scenarios = job.scenarios[part]
     try:
         policy = job.contender.make(job.nominal)
         if job.contender.identity is None:  # ours are never refused for a slow machine
             policy = Timed(policy, job.time_limit)
         return evaluate(policy, scenarios)
-    except (Exception, SystemExit) as error:  # whatever a controller may do
+    except job.contender.refusals as error:
         kind = "" if isinstance(error, ValueError | TimeoutError) else f"{type(error).__name__}: "
         return Refusal(kind + in_one_line(error))
 

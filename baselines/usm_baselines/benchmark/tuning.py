@@ -249,13 +249,13 @@ def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
     trials = [study.ask(space) for _ in range(size)]
     jobs = [problem.job(trial.params, TUNING) for trial in trials]
     first = problem.first_episodes
-    begun = _scored(jobs, 0, first, workers)
+    begun = _scored(jobs, slice(first), workers)
     for index, trial in enumerate(trials):
         trial.report(objective(begun[index], problem.weight), 0)
     going = [index for index, trial in enumerate(trials) if not trial.should_prune()]
     outcomes = {index: begun[index] for index in going}
     if problem.budget.episodes > first:
-        rest = _scored([jobs[index] for index in going], first, None, workers)
+        rest = _scored([jobs[index] for index in going], slice(first, None), workers)
         outcomes = {index: _joined(begun[index], rest[k]) for k, index in enumerate(going)}
     for index, trial in enumerate(trials):
         outcome = outcomes.get(index)
@@ -283,10 +283,8 @@ def _tell(study: Study) -> None:
             study.tell(trial.number, trial.user_attrs[OBJECTIVE])
 
 
-def _scored(
-    jobs: Sequence[Job], first: int, last: int | None, workers: int
-) -> dict[int, Evaluation | Refusal]:
-    return dict(parallel.results(score_batch, [(job, first, last) for job in jobs], workers))
+def _scored(jobs: Sequence[Job], part: slice, workers: int) -> dict[int, Evaluation | Refusal]:
+    return dict(parallel.results(score_batch, [(job, part) for job in jobs], workers))
 
 
 def _joined(first: Evaluation | Refusal, second: Evaluation | Refusal) -> Evaluation | Refusal:
