@@ -121,19 +121,9 @@ def registered(name: str, entry: Registration) -> Contender:
 
 
 def own(name: str) -> Callable[..., Any]:
-    """The factory `module:attribute`, which takes the nominal knowledge or nothing.
-
-    Modules are looked for in the current folder, too, but there last: a folder that is named like
-    one of our packages hides none.
-    """
+    """The factory `module:attribute`, which takes the nominal knowledge or nothing."""
     path, _, attribute = name.partition(":")
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    try:
-        module = importlib.import_module(path)
-    except Exception as error:
-        fault = f"{type(error).__name__}: {in_one_line(error)}"
-        raise UsageError(f"policy {name}: module {path!r} cannot be imported ({fault})") from error
+    module = imported(path, f"policy {name}")
     factory: Any = getattr(module, attribute, None)
     require(
         callable(factory),
@@ -143,6 +133,28 @@ def own(name: str) -> Callable[..., Any]:
     )
     chosen: Callable[..., Any] = factory
     return chosen
+
+
+def imported(path: str, what: str) -> ModuleType:
+    """Import a module of the user's own.
+
+    Modules are looked for in the current folder, too, but there last: a folder that is named like
+    one of our packages hides none.
+
+    Args:
+        path: Name of the module.
+        what: What it is for; begins the error.
+
+    Raises:
+        ValueError: If it cannot be imported.
+    """
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        return importlib.import_module(path)
+    except Exception as error:
+        fault = f"{type(error).__name__}: {in_one_line(error)}"
+        raise UsageError(f"{what}: module {path!r} cannot be imported ({fault})") from error
 
 
 def call(factory: Callable[..., Any], nominal: Nominal) -> Any:

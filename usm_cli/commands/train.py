@@ -19,7 +19,7 @@ TensorBoard, and the last checkpoint. Training never uses frozen suites. `usm tr
 --output DIR` continues from the last checkpoint and ends as if it had never been interrupted. A
 checkpoint is code, and resuming runs it, so resume only your own trainings. Without --resume, a
 folder that holds any part of a training is refused, and nothing in it is opened. Needs the extra
-`agents`.
+`agents`, unless the learner is your own (docs/residual.md).
 """
 EXAMPLES = """\
 examples:
@@ -30,7 +30,13 @@ examples:
 """
 # The options of the plan, by the names of its fields.
 OPTIONS = (
-    ("algorithm", str, "A", "ppo, recurrent-ppo, sac, td3 or tqc (default: ppo)"),
+    (
+        "algorithm",
+        str,
+        "A",
+        "ppo, recurrent-ppo, sac, td3, tqc, or my_module:mine, where importing my_module registers "
+        "your own learner as mine (default: ppo)",
+    ),
     ("env", str, "ID", "residual task (default: usm_agents:USM-OperationResidual-v0)"),
     ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
     ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),
@@ -67,8 +73,8 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Train with a progress bar, and print the result."""
     folder = Path(arguments.output)
-    check_installed("usm train", "agents", "sb3_contrib")
     from usm_agents.learning.plan import Plan, read_plan
+    from usm_agents.learning.settings import SETTINGS
     from usm_agents.learning.training import train
     from usm_agents.learning.validation import best_of
 
@@ -86,6 +92,8 @@ def run(arguments: argparse.Namespace) -> None:
         plan = read_plan(folder)
     else:
         plan = Plan(**given)
+    if plan.algorithm in SETTINGS:
+        check_installed("usm train", "agents", "sb3_contrib")
     with progress_bar() as bar:
         line = bar.add_task("", total=plan.steps)
 

@@ -32,7 +32,7 @@ def describe(
     recorded, best = plan.record(), best_of(curve)
     gains = getattr(residual.base, "gains", None)
     return {
-        "summary": f"{plan.algorithm.upper()} residual on {plan.base}",
+        "summary": f"{plan.algorithm.rpartition(':')[2].upper()} residual on {plan.base}",
         "mode": plan.mode,
         "conditions": recorded["conditions"],
         "base": plan.base.partition("@")[0],

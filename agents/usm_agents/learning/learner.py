@@ -6,6 +6,9 @@ of your own is registered under a name, by which a plan asks for it:
 
     register("mine", MyLearner, {"robots": 64, "ridge": 1e-3})
     train(Plan(algorithm="mine"), Path("mine"), report)
+
+A plan that asks for `my_module:mine` has `my_module` imported, which registers `mine`, before the
+training begins. So such a plan works in a process that knows nothing of the learner yet.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from usm_baselines.contender import imported
 
 from usm_agents.artifact.network import Network
 from usm_agents.learning.settings import SETTINGS
@@ -37,7 +41,7 @@ class TrainingSetup:
     one (`autoreset_mode="SameStep"`).
 
     Attributes:
-        algorithm: The name under which the plan asks for the learner.
+        algorithm: The name by which the plan asks for the learner.
         settings: The settings that the name was registered with.
         seed: Seed of everything that the learner draws.
         envs: The robots, on the residual task. The agent will see nothing but what it observes.
@@ -134,15 +138,30 @@ def algorithms() -> list[str]:
 
 
 def settings_of(algorithm: str) -> Mapping[str, Any]:
-    """The settings that a name was registered with."""
-    return _algorithms[algorithm].settings
+    """The settings that a name was registered with; as in a plan, it may begin with a module.
+
+    Raises:
+        ValueError: If there is no learner of that name, or the module cannot be imported.
+    """
+    return _algorithm(algorithm).settings
 
 
 def make_learner(setup: TrainingSetup) -> Learner:
     """Make the learner that a setup names."""
-    factory = _algorithms[setup.algorithm].factory
+    factory = _algorithm(setup.algorithm).factory
     make: Factory = resolve_name(factory) if isinstance(factory, str) else factory
     return make(setup)
+
+
+def _algorithm(name: str) -> Algorithm:
+    module, colon, registered = name.rpartition(":")
+    known = algorithms()
+    if colon:
+        imported(module, f"algorithm {name}")
+        known = [own for own in algorithms() if own not in SETTINGS]
+    allowed = ", ".join(known) or f"a name that {module} registers"
+    require(registered in known, "algorithm", name, allowed)
+    return _algorithms[registered]
 
 
 for _name, _settings in SETTINGS.items():

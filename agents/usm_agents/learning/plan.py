@@ -38,7 +38,8 @@ class Plan:
 
     Attributes:
         algorithm: "ppo", "recurrent-ppo", "sac", "td3" or "tqc", or a name that is registered with
-            `usm_agents.learning.learner`.
+            `usm_agents.learning.learner`, or "module:name" of one that the module registers; the
+            module is imported when the training begins.
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, 1e-6 to 1000 N and N m.
@@ -66,7 +67,10 @@ class Plan:
     def __post_init__(self) -> None:
         """Refuse what cannot be trained."""
         require(
-            self.algorithm in algorithms(), "algorithm", self.algorithm, ", ".join(algorithms())
+            self.algorithm in algorithms() or all(self.algorithm.rpartition(":")),
+            "algorithm",
+            self.algorithm,
+            f"{', '.join(algorithms())}, or module:name",
         )
         known = [id for id in gym.registry if id.endswith("Residual-v0")]
         require(self.env.removeprefix("usm_agents:") in known, "env", self.env, ", ".join(known))

@@ -70,11 +70,12 @@ def train(
         The learning curve: the validations, as `usm_agents.learning.validation` describes them.
 
     Raises:
-        ValueError: If the folder holds files of a training but `resume` is not set, or if its
-            checkpoint cannot be read.
+        ValueError: If there is no such algorithm, if the folder holds files of a training but
+            `resume` is not set, or if its checkpoint cannot be read.
         DivergedError: If the training diverges; its checkpoints are kept.
         BlockingIOError: If another process trains there.
     """
+    settings_of(plan.algorithm)  # refuses one that does not exist before anything is written
     folder.mkdir(parents=True, exist_ok=True)
     with holding(folder):
         left = [] if resume else traces(folder)

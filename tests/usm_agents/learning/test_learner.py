@@ -1,20 +1,25 @@
 """A learner that is not of Stable-Baselines3 is trained, resumed and scored as the others are."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support.regression import SETTINGS, Regression
 from usm_agents.artifact.folder import read_agent
 from usm_agents.artifact.network import Network
+from usm_agents.learning import learner
 from usm_agents.learning.learner import register
-from usm_agents.learning.plan import TEST_SEED, Plan
+from usm_agents.learning.plan import TEST_SEED, Plan, read_plan
 from usm_agents.learning.training import train
 from usm_agents.learning.validation import best_of
 from usm_agents.residual.env import ResidualVectorEnv
 
+from usm_cli.commands import train as commands_train
 from usm_cli.program import main
 from usm_gym.envs.vector_env import TrackingVectorEnv
+from usm_gym.support.validation import UsageError
 from usm_gym.task.metrics import total_error
 
 PLAN = Plan(algorithm="regression", steps=4096, interval=1024)
@@ -70,6 +75,66 @@ def test_the_command_scores_its_agent_as_its_training_did(tmp_path, capsys):
     assert agent.training["settings"] == SETTINGS
     # What it was told is of use: the disturbance that it cancels is that of the simulation.
     assert total_error(best_of(curve)) < 0.95 * total_error(curve[0])
+
+
+MINE = """
+from support.regression import SETTINGS, Regression
+from usm_agents.learning.learner import register
+
+register("mine", Regression, SETTINGS)
+"""
+
+
+@pytest.fixture
+def forget(tmp_path, monkeypatch):
+    """Forget the learner of a module in the current folder, as a new process would."""
+    (tmp_path / "my_module.py").write_text(MINE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def forget():
+        sys.modules.pop("my_module", None)
+        learner._algorithms.pop("mine", None)
+
+    yield forget
+    forget()
+
+
+def test_the_command_trains_a_learner_of_ones_own_and_resumes_it(forget, monkeypatch, capsys):
+    def not_installed(*arguments):
+        raise UsageError("the extra is missing")
+
+    monkeypatch.setattr(commands_train, "check_installed", not_installed)
+    chosen = ["--algorithm", "my_module:mine", "--steps", "256", "--output", "agent"]
+    main(["train", *chosen])
+    trained = capsys.readouterr().out
+    assert "after 256 steps" in trained
+    assert read_plan(Path("agent")).algorithm == "my_module:mine"
+    agent, _ = read_agent(Path("agent"))
+    assert agent.summary == "MINE residual on sta"
+    assert "--algorithm my_module:mine" in agent.training["command"]
+    forget()
+    main(["train", "--resume", "--output", "agent"])
+    assert capsys.readouterr().out == trained
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "said"),
+    [
+        ("absent:mine", "algorithm absent:mine: module 'absent' cannot be imported"),
+        ("my_module:yours", "algorithm is 'my_module:yours'; allowed: "),
+        ("my_module:ppo", "algorithm is 'my_module:ppo'; allowed: "),
+    ],
+)
+def test_a_learner_that_does_not_exist_is_refused_and_nothing_written(
+    algorithm, said, forget, capsys
+):
+    with pytest.raises(SystemExit) as left:
+        main(["train", "--algorithm", algorithm, "--output", "agent"])
+    assert left.value.code == 2
+    assert capsys.readouterr().err.startswith(f"usm: error: {said}")
+    assert not Path("agent").exists()
+    forget()
 
 
 def watch(monkeypatch, kind, name):

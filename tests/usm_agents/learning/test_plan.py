@@ -12,6 +12,7 @@ from usm_agents.learning.plan import Plan
     ("fields", "message"),
     [
         ({"algorithm": "luck"}, "algorithm is 'luck'"),
+        ({"algorithm": ":ppo"}, "algorithm is ':ppo'"),
         ({"env": "CartPole-v1"}, "env is 'CartPole-v1'"),
         ({"steps": 0}, "steps"),
         ({"seed": -1}, "seed"),
