@@ -1,4 +1,4 @@
-"""Learned residual thrust on top of the scripted policies, and the commands of `usm`.
+"""Learned residual thrust on top of the scripted policies.
 
 Importing this package registers the residual tasks and the shipped agents; it does not import
 torch.

@@ -111,6 +111,7 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         self._streams: list[np.random.Generator] = []
         self._simulation: Simulation | None = None
         self._done = np.zeros(num_envs, bool)
+        self._same_nominal = False
 
     @property
     def nominal(self) -> Nominal:
@@ -149,6 +150,9 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         streams = self._seeded(seed, which)
         indices = np.flatnonzero(which).tolist()
         scenarios = {i: self._draw(streams[i], self._options_of(i, options)) for i in indices}
+        if self._same_nominal:
+            kept = {} if which.all() else dict(enumerate(self.simulation.scenarios))
+            shared_nominal((kept | scenarios).values())
         if which.all():
             ordered = [scenarios[i] for i in indices]
             self._simulation = Simulation(ordered, self.threads)
@@ -193,6 +197,10 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         told = {**final, **self._infos(np.ones(self.num_envs, bool))}
         return simulation.observation.copy(), rewards, terminated, truncated, told
 
+    def require_same_nominal(self) -> None:
+        """From now on, refuse scenarios that would give robots different nominal knowledge."""
+        self._same_nominal = True
+
     def truth(self) -> dict[str, NDArray[np.float64]]:
         """True parameters and signals of all robots, for training; no policy is given them.
 
@@ -235,7 +243,10 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
 
     def _restart(self, which: Flags) -> None:
         for index in np.flatnonzero(which).tolist():
-            self.simulation.start(index, self._draw(self._streams[index], {}))
+            scenario = self._draw(self._streams[index], {})
+            if self._same_nominal:
+                shared_nominal((self.simulation.scenarios[index], scenario))
+            self.simulation.start(index, scenario)
 
     def _draw(self, stream: np.random.Generator, options: Mapping[str, Any]) -> Any:
         return scenario_of(self.sampler, options, stream)

@@ -136,7 +136,8 @@ class Scenario:
             reference 0.
         cross_track: Whether that guidance aims at the path, rather than at the x axis as the paper
             prints it.
-        robot: The robot: its name (`usm_gym.robots`), or itself.
+        robot: The robot, or its name (`usm_gym.robots`); all but the paper's are kept as the robot
+            itself, so that a file of scenarios is complete.
     """
 
     mode: Mode = "operation"
@@ -156,7 +157,10 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Refuse a duration of no whole number of control periods or too many steps, and names."""
-        robot_of(self.robot)
+        if self.robot != PAPER:
+            # Another process need not know a name that was given here.
+            body = robot_of(self.robot)
+            object.__setattr__(self, "robot", PAPER if body == robot_of(PAPER) else body)
         steps = self.duration / self.conditions.control_period
         require(
             round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),

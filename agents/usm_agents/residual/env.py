@@ -122,6 +122,7 @@ class ResidualVectorEnv(
         self._plain = env
         self._arguments = residual
         self._residual = Residual(env.nominal, **residual)
+        env.require_same_nominal()
         self.single_observation_space = self._residual.layout.space
         self.single_action_space = self._residual.action_space
         self.observation_space = batch_space(self.single_observation_space, env.num_envs)

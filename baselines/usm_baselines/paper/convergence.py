@@ -141,19 +141,6 @@ def growth(rate: float, exponent: float) -> float:
     return worst
 
 
-def largest_rate(exponent: float) -> float:
-    """The |F'| over L up to which the observer error shrinks under all of `switches`."""
-    L = SuperTwistingGains().observer_gain
-    low, high = 0.0, 10.0
-    while high - low > 0.02:
-        middle = 0.5 * (low + high)
-        if growth(middle * L, exponent) < 1.0:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
 def disturbance_rate(record: Record) -> Array:
     """|F'| in the worse axis between the samples of a run, m/s^3, (samples - 1,)."""
     steps = np.abs(np.diff(record.disturbance, axis=0)).max(axis=1)

@@ -1,5 +1,6 @@
 """The residual task: its base to the bit, saturation once, single as vector, and what is seen."""
 
+import dataclasses
 import warnings
 
 import gymnasium as gym
@@ -9,6 +10,7 @@ import usm_baselines
 from support import laws
 from usm_agents.residual.env import make_residual_vector_env
 
+import usm_gym
 from usm_gym.robot import Robot
 
 ID = "usm_agents:USM-OperationResidual-v0"
@@ -254,3 +256,23 @@ def test_torpedo_mode():
     seen, _ = envs.reset(seed=0)
     assert envs.unwrapped.mode == "torpedo"
     assert envs.observation_space.contains(seen)
+
+
+@pytest.mark.parametrize("some", [True, False])
+def test_robots_of_different_nominal_knowledge_are_refused_and_nothing_changes(some):
+    envs = vector(2)
+    envs.reset(seed=0)
+    plain = envs.unwrapped
+    before = [*plain.simulation.scenarios], envs.snapshot()
+    one, other = usm_gym.suite("operation")[:2]
+    slower = dataclasses.replace(other.conditions, thruster_time_constant=0.2)
+    options = {"scenario": [one, other.under(slower)]}
+    if some:
+        options |= {"reset_mask": np.array([False, True])}
+    with pytest.raises(ValueError, match="one nominal knowledge"):
+        envs.reset(options=options)
+    assert plain.simulation.scenarios == before[0]
+    action = np.zeros((2, 3), np.float32)
+    seen = envs.step(action)[0]
+    envs.restore(before[1])
+    np.testing.assert_array_equal(envs.step(action)[0], seen)

@@ -9,7 +9,6 @@ from usm_baselines.paper.convergence import (
     cascade,
     disturbance_rate,
     growth,
-    largest_rate,
     size,
 )
 from usm_baselines.paper.paper_rate import Law, simulate
@@ -23,6 +22,19 @@ PAPER = SuperTwistingGains()
 L = PAPER.observer_gain
 # The switch that does most harm to the printed gains.
 WORST = (-0.92, 0.39)
+
+
+def largest_rate(exponent: float) -> float:
+    """The |F'| over L up to which the observer error shrinks under all of `switches`."""
+    L = SuperTwistingGains().observer_gain
+    low, high = 0.0, 10.0
+    while high - low > 0.02:
+        middle = 0.5 * (low + high)
+        if growth(middle * L, exponent) < 1.0:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def test_the_observer_converges_well_beyond_its_gain():
