@@ -70,8 +70,7 @@ def body_row(
     """
     links = robot.links
     row = np.zeros(rows.body_rows(links, len(robot.thrusters)))
-    nominal = np.array(robot.hydrodynamic_coefficients)
-    row[rows.C_T : rows.LAMBDA_3 + 1] = nominal * coefficients
+    row[rows.C_T : rows.LAMBDA_3 + 1] = np.multiply(robot.hydrodynamic_coefficients, coefficients)
     k_p, k_d = joint_gains or (robot.joint_stiffness, robot.joint_damping)
     row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
     row[rows.JOINT_INERTIA] = plant.implicit * k_d + plant.implicit**2 * k_p

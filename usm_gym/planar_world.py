@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numba
 import numpy as np
@@ -180,10 +180,10 @@ class PlanarWorld(World):
             filter_frequency=motion.filter_frequency or 0.0,
             time_constant=conditions.thruster_time_constant,
         )
-        row[[rows.WATER_X, rows.WATER_Y]] = water.current
-        row[[rows.MEAN_X, rows.MEAN_Y]] = water.current
-        row[[rows.AMPLITUDE_X, rows.AMPLITUDE_Y]] = water.amplitude
-        row[[rows.PHASE_X, rows.PHASE_Y]] = water.phase
+        row[rows.WATER_X : rows.WATER_Y + 1] = water.current
+        row[rows.MEAN_X : rows.MEAN_Y + 1] = water.current
+        row[rows.AMPLITUDE_X : rows.AMPLITUDE_Y + 1] = water.amplitude
+        row[rows.PHASE_X : rows.PHASE_Y + 1] = water.phase
         row[rows.WATER_FREQUENCY] = 2 * np.pi / water.period
         share = rows.row_of(rows.SHARE, links) + links - 1 - motion.bending_joints
         row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
@@ -237,8 +237,7 @@ class PlanarWorld(World):
 
     def allocate(self, observation: NDArray[np.float32], matrices: Array) -> None:
         """Fill in the allocation matrices of robots as observed; see `World.allocate`."""
-        layout = self.layout
-        allocations(observation, self._nominal, layout.starts, layout.scale, matrices)
+        allocations(observation, *self._posture, matrices)
 
     @property
     def _guidance(self) -> int:
@@ -246,8 +245,12 @@ class PlanarWorld(World):
         return rows.body_rows(self.links, self.thrusters)
 
     @cached_property
-    def _nominal(self) -> Plant:
-        return plant_of(self.robot, 0.0)
+    def _posture(self) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
+        """What `allocations` takes of the robot and of its observation."""
+        robot, layout = self.robot, self.layout
+        tail, joints = (layout.slices[name].start for name in ("tail_angle", "joint_angles"))
+        links, normal = robot.thruster_links, robot.thruster_is_normal
+        return layout.scale, tail, joints, robot.links, robot.half_length, links, normal
 
 
 @world_of.register

@@ -117,8 +117,8 @@ class Simulation:
             ValueError: If the scenario is of another robot, does not fit the robot, or has another
                 timing than the others.
         """
-        robot = self.scenarios[0].body
-        require(scenario.body == robot, "the scenario's robot", scenario.body, f"{robot}")
+        same = scenario.body == self.scenarios[0].body
+        require(same, "the scenario's robot", scenario.body, "that of the others")
         self.world.check(scenario)
         require(
             scenario.conditions.timing == self._timing,

@@ -222,7 +222,8 @@ def info_keys(axes: tuple[str, ...], attitude: tuple[str, ...]) -> tuple[str, ..
 
 def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
     """The info of every robot: float64, (size,), some of them views of the simulation's."""
-    values = (*simulation.error.T, *simulation.max_error.T, *simulation.attitude_error.T)
-    own = (simulation.effort, simulation.lost.astype(np.float64))
+    arrays = (simulation.error, simulation.max_error, simulation.attitude_error)
+    values = [array[:, k] for array in arrays for k in range(array.shape[1])]
+    values += (simulation.effort, simulation.lost.astype(np.float64))
     keys = info_keys(simulation.world.axes, simulation.world.attitude)
-    return dict(zip(keys, (*values, *own), strict=True))
+    return dict(zip(keys, values, strict=True))

@@ -197,24 +197,27 @@ def measure_thrusters(row, lanes, lane, links, table, observation):
 
 
 @compiled
-def allocations(observation, plant, starts, scale, matrices):
-    """Fill in the allocation matrices of a batch, (batch, 3, thrusters), from what is measured.
+def allocations(
+    observation, scale, tail, joints, links, l, thruster_links, thruster_is_normal, matrices
+):
+    """Fill in the allocation matrices of a batch from the angles that are measured.
 
     Args:
         observation: Observations, (batch, numbers).
-        plant: The nominal plant.
-        starts: As in `sensors.Layout`.
-        scale: As in `sensors.Layout`.
-        matrices: Where to write.
+        scale: Physical value over observed value of each number.
+        tail: Index of the tail's angle.
+        joints: Index of the first joint's angle.
+        links: Number of links.
+        l: Half the length of a link, m.
+        thruster_links: Zero-based link of each thruster.
+        thruster_is_normal: Whether each thruster pushes across its link.
+        matrices: Where to write, (batch, 3, thrusters).
     """
-    sine, cosine = np.empty(plant.links), np.empty(plant.links)
-    tail, joints = starts[ENTRY.tail_angle], starts[ENTRY.joint_angles]
+    sine, cosine = np.empty(links), np.empty(links)
     for b in range(observation.shape[0]):
         theta = observation[b, tail] * scale[tail]
         sine[0], cosine[0] = sincos(theta)
-        for i in range(plant.links - 1):
+        for i in range(links - 1):
             theta -= observation[b, joints + i] * scale[joints + i]
             sine[i + 1], cosine[i + 1] = sincos(theta)
-        allocation_matrix(
-            sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, matrices[b]
-        )
+        allocation_matrix(sine, cosine, l, thruster_links, thruster_is_normal, matrices[b])
