@@ -143,7 +143,6 @@ class PlanarWorld(World):
             "coefficients": (rows.C_T, 6),
             "joint_shares": (rows.row_of(rows.SHARE, links), links - 1),
             "deflection": (rows.DEFLECTION, 1),
-            "limit": (rows.LIMIT, 1),
             "command": (first, self.thrusters),
             "force": (first + self.thrusters, self.thrusters),
         }

@@ -52,6 +52,7 @@ class Simulation:
         observation: Observations, float32, (size, numbers).
         max_error: Largest true errors so far after settling, m, (size, axes); 0 before.
         effort: Mean absolute thruster commands, N, (size,).
+        limit: Thruster limits, N, (size,).
         lost: Which robots are lost (`usm_gym.task.loss`), (size,).
         steps: Control periods per episode, int64, (size,).
         fleet: The state, as kernels take it.
@@ -83,7 +84,7 @@ class Simulation:
         self.observation = np.zeros((self.size, self.layout.size), np.float32)
         self.max_error = np.zeros((self.size, axes))
         self.steps = np.zeros(self.size, np.int64)
-        self.effort = np.zeros(self.size)
+        self.effort, self.limit = np.zeros(self.size), np.zeros(self.size)
         self.lost = np.zeros(self.size, bool)
         self._settled = np.zeros(self.size, np.int64)
         self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, axes))
@@ -95,11 +96,6 @@ class Simulation:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._share_out()  # what was one array before pickling has become two
-
-    @property
-    def limit(self) -> Array:
-        """Thruster limits, N, (size,)."""
-        return self.read("limit")[:, 0]
 
     def read(self, quantity: str) -> Array:
         """Read a quantity of all robots; `World.quantities` has their names.
@@ -144,6 +140,7 @@ class Simulation:
             (scenario.settle_time - TIME_TOLERANCE) / scenario.conditions.control_period
         )
         self.effort[index] = 0.0
+        self.limit[index] = scenario.conditions.thruster_limit
         self.lost[index] = False
         self.shared = self.world.shared(scenario, self.shared)
         noise = scenario.noise()

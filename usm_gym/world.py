@@ -173,7 +173,7 @@ class World(ABC):
     @property
     @abstractmethod
     def quantities(self) -> Mapping[str, slice]:
-        """Rows of the quantities that may be read, by name; `limit`, N, and `command`, N, too."""
+        """Rows of the quantities that may be read, by name; `command`, N, among them."""
 
     @property
     @abstractmethod

@@ -120,7 +120,7 @@ class BallWorld(World):
     kernels = Kernels(observe, run, run, run_threads)
     links, thrusters, rows, layout = 1, 3, ROWS, BallLayout()
     mass = property(lambda self: self.robot.mass)
-    quantities = {"command": slice(COMMAND, LIMIT), "limit": slice(LIMIT, SPEED)}  # noqa: RUF012
+    quantities = {"command": slice(COMMAND, LIMIT)}  # noqa: RUF012
 
     def write(self, scenario, row):
         row[:] = 0.0

@@ -109,26 +109,30 @@ def allocate(T, wrench, rows, work, forces):
         work: Room for D and what L is of it, for L, and for the solution, (2 rows + 1, rows).
         forces: Where to write, N, (thrusters,).
     """
-    D, L, z = work[:rows], work[rows : 2 * rows], work[2 * rows]
+    # D stands in the first rows of `work`, then L, then the solution z: views would cost more.
+    L, z = rows, 2 * rows
     for i in range(rows):
         for j in range(i + 1):
             total, taken = 0.0, 0.0
             for k in range(forces.size):
                 total += T[i, k] * T[j, k]
             for k in range(j):
-                taken += L[i, k] * L[j, k] * D[k, k] if i == j else D[i, k] * L[j, k]
-            D[i, j] = total - taken
-            L[i, j] = D[i, j] / D[j, j]
+                if i == j:
+                    taken += work[L + i, k] * work[L + j, k] * work[k, k]
+                else:
+                    taken += work[i, k] * work[L + j, k]
+            work[i, j] = total - taken
+            work[L + i, j] = work[i, j] / work[j, j]
     for i in range(rows):
-        z[i] = wrench[i]
+        work[z, i] = wrench[i]
         for k in range(i):
-            z[i] -= L[i, k] * z[k]
+            work[z, i] -= work[L + i, k] * work[z, k]
     for i in range(rows - 1, -1, -1):
-        z[i] /= D[i, i]
+        work[z, i] /= work[i, i]
         for k in range(i + 1, rows):
-            z[i] -= L[k, i] * z[k]
+            work[z, i] -= work[L + k, i] * work[z, k]
     for j in range(forces.size):
-        force = T[0, j] * z[0]
+        force = T[0, j] * work[z, 0]
         for i in range(1, rows):
-            force += T[i, j] * z[i]
+            force += T[i, j] * work[z, i]
         forces[j] = force
