@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Plant
 from usm_gym.plant.joints import filter_coefficients
-from usm_gym.plant.thrusters import lag_share
+from usm_gym.plant.thrusters import lag_shares
 from usm_gym.robot import Hydrodynamics, Robot
 
 
@@ -17,7 +17,7 @@ def plant_of(
     step: float,
     *,
     substeps: int = 1,
-    implicit: bool = True,
+    euler: bool = False,
     hydrodynamics: Hydrodynamics = "consistent",
     shifts: int = 0,
     moving_water: bool = False,
@@ -28,7 +28,8 @@ def plant_of(
         robot: The robot.
         step: Physics step, s.
         substeps: Physics steps in a control period.
-        implicit: Whether drag and joint controllers are taken implicitly.
+        euler: Whether to take forces at the beginning of a step, by Euler's forward method, rather
+            than in its middle.
         hydrodynamics: Form of the added mass.
         shifts: Largest number of changes of the joint references in any episode.
         moving_water: Whether the water's velocity changes in any episode.
@@ -37,7 +38,7 @@ def plant_of(
         l=robot.half_length,
         m=robot.link_mass,
         J=robot.link_inertia,
-        implicit=step if implicit else 0.0,
+        lead=0.0 if euler else 0.5 * step,
         kirchhoff=float(hydrodynamics == "consistent"),
         links=robot.links,
         thruster_links=robot.thruster_links,
@@ -73,10 +74,10 @@ def body_row(
     row[rows.C_T : rows.LAMBDA_3 + 1] = np.multiply(robot.hydrodynamic_coefficients, coefficients)
     k_p, k_d = joint_gains or (robot.joint_stiffness, robot.joint_damping)
     row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
-    row[rows.JOINT_INERTIA] = plant.implicit * k_d + plant.implicit**2 * k_p
+    row[rows.JOINT_INERTIA] = 2.0 * plant.lead * (k_d + plant.lead * k_p)
     side = rows.row_of(rows.SIDE, links)
     row[side : side + links] = rows.sides(links)
     row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(filter_frequency, plant.h)
     row[rows.SHIFT_TIME : rows.SHIFT_SIZE] = rows.NEVER
-    row[rows.LAG] = lag_share(time_constant, plant.h)
+    row[rows.LAG], row[rows.MEAN_LAG] = lag_shares(time_constant, plant.h)
     return row

@@ -210,7 +210,7 @@ class PlanarWorld(World):
             self.robot,
             conditions.physics_step,
             substeps=conditions.substeps,
-            implicit=conditions.integrator == "symplectic",
+            euler=conditions.integrator == "explicit",
             hydrodynamics=conditions.hydrodynamics,
             shifts=shifts,
             moving_water=moving,

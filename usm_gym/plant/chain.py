@@ -30,8 +30,7 @@ class Plant(NamedTuple):
         l: Half the length of a link, m.
         m: Mass of a link, kg.
         J: Moment of inertia of a link about its centre, kg m^2.
-        implicit: Step over which drag and joint controllers are taken implicitly, s; 0 for not
-            at all.
+        lead: How far into a step forces are taken, s: half of it, or 0 for Euler's forward method.
         kirchhoff: 1.0 for the consistent added mass, 0.0 for that of Kelasidi et al. (2014).
         links: Number of links.
         thruster_links: Zero-based link of each thruster, int64.
@@ -45,7 +44,7 @@ class Plant(NamedTuple):
     l: float
     m: float
     J: float
-    implicit: float
+    lead: float
     kirchhoff: float
     links: int
     thruster_links: NDArray[np.int64]
@@ -57,18 +56,26 @@ class Plant(NamedTuple):
 
 
 @piece
-def kinematics(block, like, wide, stride, links, l):
-    """Sine and cosine of every angle, and every link's velocity relative to the tail end.
+def kinematics(block, like, wide, stride, plant):
+    """Where forces are taken: sines and cosines of the angles, rates, velocities of the links.
+
+    That is `lead` into the step, where the angles follow from the rates at its beginning, and the
+    velocities from the accelerations of the step before. Velocities of links are relative to the
+    tail end.
 
     Returns:
         What has to be added to the velocities U_X, U_Y to make them relative to the water.
     """
-    theta, omega = row_of(THETA, links), row_of(OMEGA, links)
-    sine, cosine = row_of(SIN, links), row_of(COS, links)
+    links, l, lead = plant.links, plant.l, plant.lead
+    theta, omega, alpha = row_of(THETA, links), row_of(OMEGA, links), row_of(ALPHA, links)
+    sine, cosine, rates = row_of(SIN, links), row_of(COS, links), row_of(RATE, links)
     u_x, u_y = row_of(U_X, links), row_of(U_Y, links)
     for i in range(0, links, stride):
-        s, c = sincos(load(block, theta + i, wide))
-        speed = l * load(block, omega + i, wide)
+        now = load(block, omega + i, wide)
+        s, c = sincos(load(block, theta + i, wide) + lead * now)
+        rate = now + lead * load(block, alpha + i, wide)
+        speed = l * rate
+        store(block, rates + i, rate)
         store(block, sine + i, s)
         store(block, cosine + i, c)
         store(block, u_x + i, -speed * s)
@@ -82,9 +89,11 @@ def kinematics(block, like, wide, stride, links, l):
         run_x, run_y = run_x + 2.0 * half_x, run_y + 2.0 * half_y
         sum_x, sum_y = sum_x + centre_x, sum_y + centre_y
     share = 1.0 / links
+    v_x = load(block, V_X, like) + lead * load(block, A_X, like)
+    v_y = load(block, V_Y, like) + lead * load(block, A_Y, like)
     return (
-        load(block, V_X, like) - load(block, WATER_X, like) - share * sum_x,
-        load(block, V_Y, like) - load(block, WATER_Y, like) - share * sum_y,
+        v_x - load(block, WATER_X, like) - share * sum_x,
+        v_y - load(block, WATER_Y, like) - share * sum_y,
     )
 
 
@@ -106,13 +115,12 @@ def fluid_force(v_t, v_n, omega, water_t, coefficients, kirchhoff):
 
 
 @piece
-def inertia(v_t, v_n, omega, coefficients, plant):
-    """Inertia of a link along, across and in yaw; implicit drag adds its step times its slope."""
-    c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
-    along = plant.m + plant.implicit * (c_t * (1.0 + 2.0 * abs(v_t)))
-    across = plant.m + mu + plant.implicit * (c_n * (1.0 + 2.0 * abs(v_n)))
-    yaw = plant.J + lambda_1 + plant.implicit * (lambda_2 + 2.0 * lambda_3 * abs(omega))
-    return along, across, yaw
+def damping(v_t, v_n, omega, coefficients):
+    """How drag grows with the velocity along and across a link and with its rate."""
+    c_t, c_n, _, _, lambda_2, lambda_3 = coefficients
+    along = c_t * (1.0 + 2.0 * abs(v_t))
+    across = c_n * (1.0 + 2.0 * abs(v_n))
+    return along, across, lambda_2 + 2.0 * lambda_3 * abs(omega)
 
 
 @piece
@@ -122,6 +130,9 @@ def own_answers(block, like, wide, stride, links, base, plant):
     An answer is (a, b_x, b_y, c_xx, c_xy, c_yy, r, r_x, r_y): to the angular acceleration `alpha`
     of the link and the linear acceleration q of the point it gives the moment r - a alpha - b . q
     and the force (r_x, r_y) - b alpha - C q.
+
+    Drag is that at the velocity to which the link's new acceleration leads, in place of that of the
+    step before: it joins the link's inertia.
     """
     rows = padded(links)
     own = row_of(OWN, links)
@@ -137,14 +148,23 @@ def own_answers(block, like, wide, stride, links, base, plant):
     for i in range(0, links, stride):
         s = load(block, row_of(SIN, links) + i, wide)
         c = load(block, row_of(COS, links) + i, wide)
-        omega = load(block, row_of(OMEGA, links) + i, wide)
+        omega = load(block, row_of(RATE, links) + i, wide)
         u_x = base[0] + load(block, row_of(U_X, links) + i, wide)
         u_y = base[1] + load(block, row_of(U_Y, links) + i, wide)
         v_t = c * u_x + s * u_y
         v_n = c * u_y - s * u_x
         water_t = c * water_x + s * water_y
         f_t, f_n, moment = fluid_force(v_t, v_n, omega, water_t, coefficients, plant.kirchhoff)
-        along, across, yaw = inertia(v_t, v_n, omega, coefficients, plant)
+        d_t, d_n, d_yaw = damping(v_t, v_n, omega, coefficients)
+        d_t, d_n, d_yaw = plant.lead * d_t, plant.lead * d_n, plant.lead * d_yaw
+        a_x = load(block, row_of(LINK_AX, links) + i, wide)
+        a_y = load(block, row_of(LINK_AY, links) + i, wide)
+        f_t += d_t * (c * a_x + s * a_y)
+        f_n += d_n * (c * a_y - s * a_x)
+        moment += d_yaw * load(block, row_of(ALPHA, links) + i, wide)
+        along = plant.m + d_t
+        across = plant.m + coefficients[2] + d_n
+        yaw = plant.J + coefficients[3] + d_yaw
         # The point is reach t from the centre, which moves with q - reach (alpha n - omega^2 t).
         reach = plant.l * load(block, row_of(SIDE, links) + i, wide)
         f_t += load(block, row_of(PUSH_T, links) + i, wide) - reach * ((omega * omega) * along)
@@ -168,7 +188,7 @@ def axes(block, like, i, links):
     return (
         load(block, row_of(SIN, links) + i, like),
         load(block, row_of(COS, links) + i, like),
-        load(block, row_of(OMEGA, links) + i, like),
+        load(block, row_of(RATE, links) + i, like),
     )
 
 
@@ -293,14 +313,17 @@ def substitute(block, like, i, side, links, l, motion):
     )
     store(block, row_of(ALPHA, links) + i, alpha)
     half_x, half_y = half_link(block, like, i, links, alpha, side * l)
+    centre_x, centre_y = joint_x - half_x, joint_y - half_y
+    store(block, row_of(LINK_AX, links) + i, centre_x)
+    store(block, row_of(LINK_AY, links) + i, centre_y)
     return (
         alpha,
         joint_x,
         joint_y,
-        joint_x - 2.0 * half_x,
-        joint_y - 2.0 * half_y,
-        sum_x + (joint_x - half_x),
-        sum_y + (joint_y - half_y),
+        centre_x - half_x,
+        centre_y - half_y,
+        sum_x + centre_x,
+        sum_y + centre_y,
     )
 
 
@@ -326,6 +349,8 @@ def accelerate(block, like, wide, stride, links, base, plant):
         tail = eliminate(block, like, root - 1, 1.0, links, l, tail)
     alpha, q_x, q_y = solve_root(block, like, root, links, tail, head)
     store(block, row_of(ALPHA, links) + root, alpha)
+    store(block, row_of(LINK_AX, links) + root, q_x)
+    store(block, row_of(LINK_AY, links) + root, q_y)
     half_x, half_y = half_link(block, like, root, links, alpha, l)
     towards_tail = (alpha, q_x, q_y, q_x - half_x, q_y - half_y, q_x, q_y)
     towards_head = (alpha, q_x, q_y, q_x + half_x, q_y + half_y, like, like)
@@ -345,5 +370,5 @@ def accelerate_all(blocks, links, plant):
     wide = spread(0.0)
     for k in range(blocks.shape[0]):
         block = block_at(blocks, k, 0.0)
-        base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
+        base = kinematics(block, 0.0, wide, WIDTH, plant)
         accelerate(block, 0.0, wide, WIDTH, links, base, plant)

@@ -36,34 +36,53 @@ def filter_coefficients(frequency, step):
 
 @piece
 def advance_references(block, like, shifts, h):
-    """Move the joint references on by one physics step, towards the deflection now asked for."""
-    t = load(block, CLOCK, like) * h
-    target = like
+    """Move the joint references on by one physics step, towards the deflection asked for.
+
+    In the step in which a change falls, the deflection asked for is its mean over the step.
+    """
+    end = load(block, CLOCK, like) + 1.0
+    target, at_end = like, like
     for k in range(shifts):
-        reached = t >= load(block, SHIFT_TIME + k, like)
-        target += where(reached, load(block, SHIFT_SIZE + k, like), like)
+        size = load(block, SHIFT_SIZE + k, like)
+        share = end - load(block, SHIFT_TIME + k, like) / h
+        begun = share > 0.0
+        target += where(begun, where(share < 1.0, share, 1.0) * size, like)
+        at_end += where(begun, size, like)
     x = load(block, DEFLECTION, like) - target
     rate = load(block, DEFLECTION_RATE, like)
     moved = load(block, FILTER_DD, like) * x + load(block, FILTER_DR, like) * rate
     turned = load(block, FILTER_RD, like) * x + load(block, FILTER_RR, like) * rate
     store(block, DEFLECTION, target + moved)
     store(block, DEFLECTION_RATE, turned)
-    pull = load(block, FILTER_STIFFNESS, like) * moved + load(block, FILTER_DAMPING, like) * turned
+    away = moved + (target - at_end)
+    pull = load(block, FILTER_STIFFNESS, like) * away + load(block, FILTER_DAMPING, like) * turned
     store(block, DEFLECTION_ACCELERATION, -pull)
 
 
 @piece
-def joint_torques(block, like, wide, stride, links, implicit):
+def asked_torque(block, like):
+    """What the joint references ask for now: k_p phi_ref + k_d phi_ref', of a joint of share 1."""
+    stiffness = load(block, STIFFNESS, like) * load(block, DEFLECTION, like)
+    return stiffness + load(block, DAMPING, like) * load(block, DEFLECTION_RATE, like)
+
+
+@piece
+def joint_torques(block, like, wide, stride, links, lead, asked):
     """Torque of every joint controller, less the part that is in the joint-space inertia.
 
-    u = k_p (phi_ref - phi - h phi') + k_d (phi_ref' - phi') - (h k_d + h^2 k_p) phi''.
+    It is that of the middle of a step of 2 lead, from those at three ends of steps: the torque to
+    come less half the change over the step before, u_1 - (u_0 - u_-1) / 2. So the fast motion that
+    the stiff controllers damp dies out within a few steps, which it would not with the mean of u_0
+    and u_1. What the references ask for, which is smooth, is `asked` itself.
     """
     k_p, k_d = load(block, STIFFNESS, like), load(block, DAMPING, like)
-    target = k_p * load(block, DEFLECTION, like) + k_d * load(block, DEFLECTION_RATE, like)
-    damping = k_d + implicit * k_p
-    theta, omega = row_of(THETA, links), row_of(OMEGA, links)
+    on_rate = k_d + lead * k_p
+    on_acceleration = lead * (k_d - lead * k_p)
+    theta, omega, alpha = row_of(THETA, links), row_of(OMEGA, links), row_of(ALPHA, links)
     for i in range(0, links - 1, stride):
         phi = load(block, theta + i, wide) - load(block, theta + i + 1, wide)
         phi_dot = load(block, omega + i, wide) - load(block, omega + i + 1, wide)
-        wanted = target * load(block, row_of(SHARE, links) + i, wide)
-        store(block, row_of(TORQUE, links) + i, wanted - k_p * phi - damping * phi_dot)
+        phi_ddot = load(block, alpha + i, wide) - load(block, alpha + i + 1, wide)
+        wanted = asked * load(block, row_of(SHARE, links) + i, wide)
+        held = k_p * phi + on_rate * phi_dot - on_acceleration * phi_ddot
+        store(block, row_of(TORQUE, links) + i, wanted - held)

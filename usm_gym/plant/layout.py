@@ -31,12 +31,13 @@ STIFFNESS, DAMPING, JOINT_INERTIA = range(24, 27)
 # filter over one physics step (deflection and rate, from either) and what gives the acceleration.
 DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(27, 30)
 FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = range(30, 36)
-# Thrusters: share of the way to the command that one physics step covers, and the limit.
-LAG, LIMIT = range(36, 38)
+# Thrusters: share of the way to the command that a physics step covers by its end and in its mean,
+# and the limit.
+LAG, MEAN_LAG, LIMIT = range(36, 39)
 # Times of the changes of the deflection (`NEVER` where there is none), then their sizes.
 NEVER = 1e30
 MAX_SHIFTS = 8
-SHIFT_TIME = 38
+SHIFT_TIME = 39
 SHIFT_SIZE = SHIFT_TIME + MAX_SHIFTS
 HEADER = SHIFT_SIZE + MAX_SHIFTS
 
@@ -44,10 +45,14 @@ HEADER = SHIFT_SIZE + MAX_SHIFTS
 # that is the reference of the joint to the next link, and on which side of the root the link is
 # (1.0 tail, 0.0 the root itself, -1.0 head). Thrust along and across.
 THETA, OMEGA, SHARE, SIDE, PUSH_T, PUSH_N = range(6)
-# Sine and cosine of the angle, velocity of the centre, torque of the joint to the next link.
-SIN, COS, U_X, U_Y, TORQUE, ALPHA = range(6, 12)
+# Where forces are taken: sine and cosine of the angle, its rate, velocity of the centre, torque of
+# the joint to the next link.
+SIN, COS, RATE, U_X, U_Y, TORQUE = range(6, 12)
+# Angular acceleration, and acceleration of the centre relative to the water; those of the step
+# before until `accelerate` has found those of this one.
+ALPHA, LINK_AX, LINK_AY = range(12, 15)
 # The link's own answer, see `chain`; once it is eliminated, its back substitution.
-OWN = 12
+OWN = 15
 SUB_0, SUB_G, SUB_X, SUB_Y = range(OWN, OWN + 4)
 QUANTITIES = OWN + 9
 

@@ -1,7 +1,8 @@
 """The physics steps of a control period, for blocks of robots.
 
-Every quantity is a float64 or a `Lanes`, as in `chain`. `implicit` is the physics step h for
-symplectic Euler with implicit drag and joints, and 0 for explicit Euler.
+Every quantity is a float64 or a `Lanes`, as in `chain`. The method is a linearly implicit midpoint
+rule of second order (docs/model.md section 7): forces are taken `lead` into the step, half of it;
+with a lead of 0 the same lines are Euler's forward method.
 """
 
 from __future__ import annotations
@@ -10,16 +11,16 @@ from usm_gym.kernels.compile import piece
 from usm_gym.kernels.elementary import sincos
 from usm_gym.kernels.lanes import load, store
 from usm_gym.plant.chain import accelerate, kinematics
-from usm_gym.plant.joints import advance_references, joint_torques
+from usm_gym.plant.joints import advance_references, asked_torque, joint_torques
 from usm_gym.plant.layout import *
 from usm_gym.plant.thrusters import push
 
 
 @piece
-def move_water(block, like, h):
-    """Velocity and acceleration of the water now."""
+def move_water(block, like, plant):
+    """Velocity and acceleration of the water where forces are taken."""
     frequency = load(block, WATER_FREQUENCY, like)
-    angle = frequency * (load(block, CLOCK, like) * h)
+    angle = frequency * (load(block, CLOCK, like) * plant.h + plant.lead)
     s, c = sincos(angle + load(block, PHASE_X, like))
     amplitude = load(block, AMPLITUDE_X, like)
     store(block, WATER_X, load(block, MEAN_X, like) + amplitude * s)
@@ -31,37 +32,33 @@ def move_water(block, like, h):
 
 
 @piece
-def integrate(block, like, wide, stride, links, h, implicit):
-    """Positions from the new velocities, or from the old ones where `implicit` is 0."""
-    symplectic = implicit > 0.0
+def integrate(block, like, wide, stride, links, h, lead):
+    """Velocities from the accelerations, positions from the velocities `lead` into the step."""
     theta, omega, alpha = row_of(THETA, links), row_of(OMEGA, links), row_of(ALPHA, links)
     for i in range(0, links, stride):
-        old = load(block, omega + i, wide)
-        new = old + h * load(block, alpha + i, wide)
-        rate = new if symplectic else old
-        store(block, omega + i, new)
-        store(block, theta + i, load(block, theta + i, wide) + h * rate)
+        rate, acceleration = load(block, omega + i, wide), load(block, alpha + i, wide)
+        store(block, omega + i, rate + h * acceleration)
+        moved = h * (rate + lead * acceleration)
+        store(block, theta + i, load(block, theta + i, wide) + moved)
     for axis in range(2):
-        old = load(block, V_X + axis, like)
-        new = old + h * load(block, A_X + axis, like)
-        rate = new if symplectic else old
-        store(block, V_X + axis, new)
-        store(block, P_X + axis, load(block, P_X + axis, like) + h * rate)
+        rate, acceleration = load(block, V_X + axis, like), load(block, A_X + axis, like)
+        store(block, V_X + axis, rate + h * acceleration)
+        moved = h * (rate + lead * acceleration)
+        store(block, P_X + axis, load(block, P_X + axis, like) + moved)
     store(block, CLOCK, load(block, CLOCK, like) + 1.0)
 
 
 @piece
 def physics_step(block, like, wide, stride, plant, base):
     """One physics step from kinematics that are known; arguments as in `chain.accelerate`."""
-    links, h, implicit = plant.links, plant.h, plant.implicit
-    if implicit > 0.0:
-        advance_references(block, like, plant.shifts, h)
+    links, h, lead = plant.links, plant.h, plant.lead
+    before = asked_torque(block, like)
+    advance_references(block, like, plant.shifts, h)
+    asked = before + (lead / h) * (asked_torque(block, like) - before)
     push(block, like, plant)
-    joint_torques(block, like, wide, stride, links, implicit)
+    joint_torques(block, like, wide, stride, links, lead, asked)
     accelerate(block, like, wide, stride, links, base, plant)
-    if implicit == 0.0:
-        advance_references(block, like, plant.shifts, h)
-    integrate(block, like, wide, stride, links, h, implicit)
+    integrate(block, like, wide, stride, links, h, lead)
 
 
 @piece
@@ -69,6 +66,6 @@ def advance(block, like, wide, stride, plant):
     """Advance one block by a control period; `like`, `wide` and `stride` as in `chain`."""
     for _ in range(plant.substeps):
         if plant.moving_water:
-            move_water(block, like, plant.h)
-        base = kinematics(block, like, wide, stride, plant.links, plant.l)
+            move_water(block, like, plant)
+        base = kinematics(block, like, wide, stride, plant)
         physics_step(block, like, wide, stride, plant, base)

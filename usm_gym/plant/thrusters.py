@@ -9,11 +9,21 @@ from usm_gym.plant.layout import *
 
 
 @compiled
-def lag_share(time_constant, step):
-    """Share of the way to its command that a thruster covers in a physics step, 1 - e^(-h/tau)."""
+def lag_shares(time_constant, step):
+    """Shares of the way to its command that a thruster covers in a physics step h.
+
+    Args:
+        time_constant: tau, s.
+        step: h, s.
+
+    Returns:
+        The share at the end of the step, 1 - e^(-h/tau), and the mean over it.
+    """
     if time_constant == 0.0:
-        return 1.0
-    return 1.0 - exp_of_negative(-step / time_constant)
+        return 1.0, 1.0
+    ratio = step / time_constant
+    share = 1.0 - exp_of_negative(-ratio)
+    return share, 1.0 - share / ratio
 
 
 @shared
@@ -42,21 +52,21 @@ def command(row, lanes, lane, links, action):
 
 @piece
 def push(block, like, plant):
-    """First-order lag of every thruster, and its force on its link."""
+    """First-order lag of every thruster, and its mean force over a physics step on its link."""
     links, thrusters = plant.links, plant.thruster_links.size
     along, across = row_of(PUSH_T, links), row_of(PUSH_N, links)
     for j in range(thrusters):
         store(block, along + plant.thruster_links[j], like)
         store(block, across + plant.thruster_links[j], like)
-    lag = load(block, LAG, like)
+    lag, mean_lag = load(block, LAG, like), load(block, MEAN_LAG, like)
     commands = first_command(links)
     forces = commands + thrusters
     for j in range(thrusters):
         force = load(block, forces + j, like)
-        force += lag * (load(block, commands + j, like) - force)
-        store(block, forces + j, force)
+        way = load(block, commands + j, like) - force
+        store(block, forces + j, force + lag * way)
         target = plant.thruster_links[j] + (across if plant.thruster_is_normal[j] else along)
-        store(block, target, load(block, target, like) + force)
+        store(block, target, load(block, target, like) + (force + mean_lag * way))
 
 
 @piece

@@ -210,8 +210,8 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
         position, rate, acceleration = (p_x, p_y), (v_x, v_y), (a_x, a_y)
         error[0], error[1] = row[P_X] - p_x, row[P_Y] - p_y
         if plant.moving_water:
-            move_water(block, 0.0, h)
-        base = kinematics(block, 0.0, wide, WIDTH, links, plant.l)
+            move_water(block, 0.0, plant)
+        base = kinematics(block, 0.0, wide, WIDTH, plant)
         if step % plant.substeps == 0:
             instant = step // plant.substeps
             measured = noise[min(instant, noise.shape[0] - 1)]
