@@ -64,10 +64,9 @@ class Evaluation:
     per_episode: dict[str, NDArray[np.float64]]
     failed: NDArray[np.bool_]
 
-    @property
-    def total_error(self) -> NDArray[np.float64]:
-        """What policies are ranked by, m, (episodes,): see `metrics.total_error`."""
-        return np.asarray(metrics.total_error(self.per_episode))
+    def objective(self, variation_weight: float = metrics.VARIATION_WEIGHT) -> NDArray[np.float64]:
+        """What policies are ranked by, mm, (episodes,): see `metrics.objective`."""
+        return np.asarray(metrics.objective(self.per_episode, variation_weight))
 
     def summary(self) -> dict[str, Any]:
         """Mean with interval and worst episode by metric, failures, and all episodes."""

@@ -210,15 +210,16 @@ class World(ABC):
         """
         return bool(find_lost(error, attitude_error, self.lost_error, lost))
 
-    def reward(self, error: Array, effort: Array, limit: Array) -> Array:
+    def reward(self, error: Array, attitude_error: Array, effort: Array, limit: Array) -> Array:
         """Rewards of a step, (size,).
 
         Args:
             error: True position errors, m, (size, axes).
+            attitude_error: Attitude errors, rad, (size, angles).
             effort: Mean absolute thruster commands after saturation, N, (size,).
             limit: Thruster limits, N, (size,).
         """
-        return reward(error, effort, limit)
+        return reward(error, attitude_error, effort, limit)
 
     def reward_of_loss(self, remaining: NDArray[np.int64]) -> Array:
         """Rewards of the steps that lose robots, (lost,).
@@ -226,7 +227,7 @@ class World(ABC):
         Args:
             remaining: Control periods that were left of their episodes, (lost,).
         """
-        return reward_of_loss(remaining)
+        return reward_of_loss(remaining, len(self.attitude))
 
     def truth(self, read: Callable[[str], Array]) -> dict[str, Array]:
         """What training may be told and no policy: true parameters and signals, by name.

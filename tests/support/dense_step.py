@@ -71,7 +71,7 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
     """Return the moment one physics step later, under thruster commands in N."""
     conditions, water = scenario.conditions, scenario.water
     h = conditions.physics_step
-    implicit = conditions.integrator == "symplectic"
+    implicit = conditions.integrator == "midpoint"
     t = moment.steps * h
 
     reference = filtered(scenario, moment.reference, t, h)

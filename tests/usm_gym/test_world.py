@@ -69,7 +69,7 @@ def test_the_same_laws_hold_three_axes():
         assert not one.failed.any()
         assert all(values.max() < 0.03 for values in errors_of(one))
     assert "heading_error" not in scores["sta"].per_episode
-    found = compare(scores["pd"].total_error, scores["sta"].total_error)
+    found = compare(scores["pd"].objective(), scores["sta"].objective())
     assert found.second < found.first
 
 

@@ -57,7 +57,7 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Tune, write the gains, print their scores."""
     check_installed("usm tune", "tune", "optuna")
-    from usm_baselines.benchmark.tuning import VARIATION_WEIGHT, Problem, tune
+    from usm_baselines.benchmark.tuning import Problem, tune
 
     output = Path(arguments.output or f"{arguments.policy}.json")
     check_writable(output)

@@ -277,7 +277,7 @@ CHAPTERS: dict[type[Result], Callable[[Any, Choice, Progress], Chapter]] = {
 
 def by_total(rows: Mapping[str, Scores]) -> dict[str, Scores]:
     """Sort rows by their error, the smallest first."""
-    return dict(sorted(rows.items(), key=lambda pair: pair[1].total))
+    return dict(sorted(rows.items(), key=lambda pair: pair[1].objective))
 
 
 def conditions(

@@ -63,7 +63,7 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
         halves = [interquartile_mean(row.per_episode[MAX_ERROR + axis]) for axis in axes]
         cells = [Cell(name, name, "" if competes(row) else "no competitor")]
         cells += [Cell(mm(e.mean), e.mean, interval(e)) for e in errors.values()]
-        cells.append(Cell("", row.total, marks=scale.marks(errors)))
+        cells.append(Cell("", row.objective, marks=scale.marks(errors)))
         cells += [length(float(half)) for half in halves]
         cells += [length(error.worst) for error in errors.values()]
         for key in ("thrust_effort", "thrust_variation"):

@@ -30,13 +30,18 @@ def competitors(rows: Mapping[str, Scores]) -> dict[str, Scores]:
 def motion(rows: Mapping[str, Scores]) -> str:
     """Describe what joint motion does to the controller that it harms most."""
 
-    def calm(row: Scores) -> float:
-        return sum(error.mean for error in row.by_axis("settled_error").values())
+    def total(row: Scores, metric: str) -> float:
+        return sum(error.mean for error in row.by_axis(metric).values())
 
-    known = {name: row for name, row in competitors(rows).items() if calm(row) > 0}
+    def harm(row: Scores) -> float:
+        return total(row, "max_error") / total(row, "settled_error")
+
+    known = {
+        name: row for name, row in competitors(rows).items() if total(row, "settled_error") > 0
+    }
     if not known:
         return ""
-    name, row = max(known.items(), key=lambda pair: pair[1].total / calm(pair[1]))
+    name, row = max(known.items(), key=lambda pair: harm(pair[1]))
     return (
         f"With {name} the error reaches {in_axes(row, 'max_error')}, but only "
         f"{in_axes(row, 'settled_error')} outside the {RECOVERY:g} s after each motion of the "
@@ -49,7 +54,7 @@ def verdict(rows: Mapping[str, Scores], episodes: int) -> str:
     known = competitors(rows)
     if not known:
         return ""
-    best = min(known, key=lambda name: known[name].total)
+    best = min(known, key=lambda name: known[name].objective)
     said = (
         f"The best, {best}, keeps it to {in_axes(known[best], 'max_error')}, the mean of "
         f"{episodes} episodes{'' if episodes >= FEWEST_EPISODES else ', too few for a conclusion'}."

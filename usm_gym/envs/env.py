@@ -207,7 +207,9 @@ def outcome(
     """Rewards, terminations and truncations of the step just made, (size,) each."""
     world, lost = simulation.world, simulation.lost
     remaining = simulation.steps - simulation.count
-    rewards = world.reward(simulation.error, simulation.effort, simulation.limit)
+    rewards = world.reward(
+        simulation.error, simulation.attitude_error, simulation.effort, simulation.limit
+    )
     if lost.any():
         rewards[lost] = world.reward_of_loss(remaining[lost])
     return rewards, lost.copy(), (remaining <= 0) & ~lost

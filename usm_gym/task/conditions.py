@@ -30,8 +30,9 @@ class Conditions:
     Attributes:
         control_period: Time between two actions, 1e-6 to 1 s; up to 10000 physics steps.
         physics_step: Step of the integration, 1e-6 to 0.1 s.
-        integrator: "symplectic" treats drag and joint controllers implicitly; "explicit" is Euler's
-            forward method, stable with the default joint gains only below about 1e-4 s.
+        integrator: "midpoint" is of second order and treats drag and joint controllers implicitly;
+            "explicit" is Euler's forward method, stable with the default joint gains only below
+            about 1e-4 s.
         hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
         thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
         thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
@@ -46,7 +47,7 @@ class Conditions:
 
     control_period: Annotated[Number, Field(ge=1e-6, le=1)] = 0.02
     physics_step: Annotated[Number, Field(ge=1e-6, le=0.1)] = 1e-3
-    integrator: Literal["symplectic", "explicit"] = "symplectic"
+    integrator: Literal["midpoint", "explicit"] = "midpoint"
     hydrodynamics: Hydrodynamics = "consistent"
     thruster_time_constant: Annotated[Number, Field(ge=0, le=100)] = 0.05
     thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0

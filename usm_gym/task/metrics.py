@@ -13,8 +13,11 @@ from usm_gym.support.validation import real_array, require
 # Controllers are given this long after a change of the joint references, s.
 RECOVERY = 7.0
 TIME_TOLERANCE = 1e-9
-# Begins the names of the metric of Table 1, one per axis.
-MAX_ERROR = "max_error_"
+# Begins the names of the metric of Table 1, one per axis, and ends those of attitude errors.
+MAX_ERROR, ANGLE_ERROR = "max_error_", "_error"
+# What thrust variation costs in the objective, mm per N/s, and an error of the attitude, mm per
+# degree: ten degrees are as bad as half a millimetre.
+VARIATION_WEIGHT, ATTITUDE_WEIGHT = 0.002, 0.05
 
 
 def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:
@@ -89,13 +92,26 @@ def axes_of(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name.removeprefix(MAX_ERROR) for name in names if name.startswith(MAX_ERROR))
 
 
-def total_error(scores: Mapping[str, Any]) -> Any:
-    """What policies are ranked by: the largest errors of all axes, added up, m; less is better.
+def attitude_of(names: Iterable[str]) -> tuple[str, ...]:
+    """The angles of scores, from the names of their columns `ANGLE_error`, in order."""
+    return tuple(name.removesuffix(ANGLE_ERROR) for name in names if name.endswith(ANGLE_ERROR))
+
+
+def objective(scores: Mapping[str, Any], variation_weight: float = VARIATION_WEIGHT) -> Any:
+    """What gains and agents are chosen by and tables are ordered by, mm; less is better.
+
+    It is the largest errors of all axes, added up, plus what the largest errors of the attitude
+    and thrust variation cost.
 
     Args:
-        scores: Numbers or arrays by the names of metrics, `max_error_AXIS` among them.
+        scores: Numbers or arrays by the names of metrics: `max_error_AXIS`, m, `ANGLE_error`, rad,
+            and `thrust_variation`, N/s.
+        variation_weight: Cost of thrust variation, mm per N/s.
     """
-    return sum(scores[MAX_ERROR + axis] for axis in axes_of(scores))
+    error = sum(scores[MAX_ERROR + axis] for axis in axes_of(scores))
+    attitude = sum(np.degrees(scores[angle + ANGLE_ERROR]) for angle in attitude_of(scores))
+    variation = scores["thrust_variation"]
+    return 1e3 * error + ATTITUDE_WEIGHT * attitude + variation_weight * variation
 
 
 def _checked(

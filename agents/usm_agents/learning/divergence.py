@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from usm_agents.learning.validation import Validation
 from usm_gym.support.validation import UsageError
-from usm_gym.task.metrics import total_error
+from usm_gym.task.metrics import objective
 
 # So many validations in a row are so many times worse than the best.
 COLLAPSE_COUNT, COLLAPSE_RATIO = 3, 5.0
@@ -37,7 +37,7 @@ def check_curve(curve: Sequence[Validation]) -> None:
     Raises:
         DivergedError: If they are.
     """
-    errors = [total_error(validation) for validation in curve]
+    errors = [objective(validation) for validation in curve]
     limit = COLLAPSE_RATIO * min(errors)
     last = errors[-COLLAPSE_COUNT:]
     if len(last) == COLLAPSE_COUNT and all(error > limit for error in last):

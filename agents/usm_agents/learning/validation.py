@@ -1,8 +1,8 @@
 """Scores of an agent: on held-out scenarios while it is trained, and on others in the end.
 
 A validation is a point of the learning curve, as `curve.json` has it: `steps` and `seconds` of the
-training so far, the means of `max_error_AXIS` (m) and `thrust_variation` (N/s) over the held-out
-scenarios, and in how many of them the robot was lost, `failures`.
+training so far, the means of `max_error_AXIS` (m), `ANGLE_error` (rad) and `thrust_variation`
+(N/s) over the held-out scenarios, and in how many of them the robot was lost, `failures`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from usm_gym.suites import unseen
 from usm_gym.support.seeding import VALIDATION, stream
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
-from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
+from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Scenario
 
@@ -57,12 +57,13 @@ def validate(
 def metrics_of(scores: Mapping[str, Any]) -> dict[str, Any]:
     """Those metrics of scores that a validation has, by name."""
     names = [MAX_ERROR + axis for axis in axes_of(scores)]
+    names += [angle + ANGLE_ERROR for angle in attitude_of(scores)]
     return {name: scores[name] for name in (*names, "thrust_variation")}
 
 
 def best_of(curve: Sequence[Validation]) -> Validation:
     """The best validation of a learning curve, the first of equal ones."""
-    return min(curve, key=total_error)
+    return min(curve, key=objective)
 
 
 def is_validation(value: Any) -> bool:

@@ -10,7 +10,7 @@ from usm_baselines.benchmark.results import Failures, MiddleSummary, Scores
 
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
-from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
+from usm_gym.task.metrics import MAX_ERROR, axes_of, objective
 from usm_gym.task.scenario import Mode
 
 # The mode of the main suite, whose name is left out where others are named.
@@ -42,9 +42,9 @@ class CurvePoint(Part):
         return {axis: self.means[MAX_ERROR + axis] for axis in axes_of(self.means)}
 
     @property
-    def total(self) -> float:
-        """What agents are ranked by, m."""
-        return float(total_error(self.means))
+    def objective(self) -> float:
+        """What agents are chosen by, mm: see `usm_gym.task.metrics.objective`."""
+        return float(objective(self.means))
 
 
 @validated

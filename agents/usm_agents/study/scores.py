@@ -199,7 +199,9 @@ def against(ours: SeedScores, theirs: SeedScores) -> Claim:
 
 def best_so_far(curves: Mapping[str, Sequence[CurvePoint]]) -> dict[int, float]:
     """By steps: validated error of the best agent so far, the median over the seeds, m."""
-    errors = [np.minimum.accumulate([point.total for point in curve]) for curve in curves.values()]
+    errors = [
+        np.minimum.accumulate([point.objective for point in curve]) for curve in curves.values()
+    ]
     points = zip(next(iter(curves.values())), zip(*errors, strict=False), strict=False)
     return {point.steps: float(np.median(totals)) for point, totals in points}
 

@@ -49,7 +49,7 @@ class Lead:
     @classmethod
     def over(cls, worse: Evaluation, better: Evaluation) -> Self:
         """The lead of the better scores over the worse."""
-        compared = compare(worse.total_error, better.total_error)
+        compared = compare(worse.objective(), better.objective())
         return cls(
             episodes=compared.episodes,
             probability=compared.improvement,
@@ -244,7 +244,7 @@ def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing
     """The rows of a suite: competitors first, the smaller error first."""
 
     def rank(pair: tuple[Contender, Evaluation]) -> tuple[bool, float]:
-        return pair[0].privileged, float(pair[1].total_error.mean())
+        return pair[0].privileged, float(pair[1].objective().mean())
 
     order = sorted(scores, key=rank)
     leads = {

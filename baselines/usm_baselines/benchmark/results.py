@@ -12,7 +12,7 @@ from usm_gym.statistics import Comparison
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.metrics import MAX_ERROR, axes_of, total_error
+from usm_gym.task.metrics import MAX_ERROR, axes_of, objective
 from usm_gym.task.stored_scenario import StoredScenarios
 
 Failures = Annotated[int, Field(strict=True, ge=0)]
@@ -96,9 +96,9 @@ class Scores(Part):
         return self.by_axis("max_error")
 
     @property
-    def total(self) -> float:
-        """What policies are ranked by: the mean errors of all axes, added up, m."""
-        return float(total_error({name: summary.mean for name, summary in self.metrics.items()}))
+    def objective(self) -> float:
+        """What policies are ranked by, mm: see `usm_gym.task.metrics.objective`."""
+        return float(objective({name: summary.mean for name, summary in self.metrics.items()}))
 
     def by_axis(self, metric: str) -> dict[str, Summary]:
         """The summary of a metric such as "settled_error", by axis."""

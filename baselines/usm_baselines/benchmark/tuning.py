@@ -35,12 +35,11 @@ from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.metrics import VARIATION_WEIGHT
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
-# Cost of thrust variation, mm per N/s. The front of error against variation comes from sweeping it.
-VARIATION_WEIGHT = 0.002
 # Trials asked for at once, from what is known before all of them.
 ROUND = 8
 # Objective of a trial that has no score, mm.
@@ -133,16 +132,13 @@ class Optimum:
 
 
 def objective(outcome: Evaluation | Refusal, weight: float = VARIATION_WEIGHT) -> float:
-    """Mean of the largest errors of all axes, added up, plus the cost of thrust variation, mm.
+    """Mean of the objective over the episodes, mm; a refusal costs more than any loss.
 
     Args:
-        outcome: Scores, or a refusal, which costs more than any loss.
+        outcome: Scores, or a refusal.
         weight: Cost of thrust variation, mm per N/s.
     """
-    if isinstance(outcome, Refusal):
-        return FAILED
-    variation = outcome.per_episode["thrust_variation"]
-    return float(np.mean(1e3 * outcome.total_error + weight * variation))
+    return FAILED if isinstance(outcome, Refusal) else float(np.mean(outcome.objective(weight)))
 
 
 def tune(

@@ -26,7 +26,7 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
         for id in (folder.name, agent.base)
     )
     assert not ours.failed.any()
-    assert ours.total_error.mean() < base.total_error.mean()
+    assert ours.objective().mean() < base.objective().mean()
     for axis in "xy":
         name = f"max_error_{axis}"
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]

@@ -20,7 +20,7 @@ from usm_cli.commands import train as commands_train
 from usm_cli.program import main
 from usm_gym.envs.vector_env import TrackingVectorEnv
 from usm_gym.support.validation import UsageError
-from usm_gym.task.metrics import total_error
+from usm_gym.task.metrics import objective
 
 PLAN = Plan(algorithm="regression", steps=4096, interval=1024)
 SMALL = {"validation_episodes": 2, "test_episodes": 2}
@@ -74,7 +74,7 @@ def test_the_command_scores_its_agent_as_its_training_did(tmp_path, capsys):
     assert scores["max_error_x"] == agent.scores["sampled"]["max_error_x"]
     assert agent.training["settings"] == SETTINGS
     # What it was told is of use: the disturbance that it cancels is that of the simulation.
-    assert total_error(best_of(curve)) < 0.95 * total_error(curve[0])
+    assert objective(best_of(curve)) < 0.95 * objective(curve[0])
 
 
 MINE = """

@@ -12,7 +12,7 @@ def test_presets_are_those_of_the_documentation() -> None:
     shared = {
         "control_period": 0.02,
         "physics_step": 1e-3,
-        "integrator": "symplectic",
+        "integrator": "midpoint",
         "hydrodynamics": "consistent",
         "motion": True,
     }
