@@ -82,7 +82,7 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
 def chosen_contenders(names: str | None) -> list[Contender]:
     """Get the policies that `--policies` names."""
     if names is None:
-        chosen = [id for id in ids() if not (entry(id).slow or entry(id).privileged)]
+        chosen = [id for id in ids() if not (entry(id).on_request or entry(id).privileged)]
     else:
         chosen = [name.strip() for name in names.split(",") if name.strip()]
     require(len(chosen) > 0, "--policies", names, "one name or more")

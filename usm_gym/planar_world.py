@@ -21,7 +21,7 @@ from usm_gym.plant.thrusters import command
 from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task import guidance
-from usm_gym.task.observation import ObservationLayout, allocations, measure
+from usm_gym.task.observation import ObservationLayout, allocations, find_error, measure
 from usm_gym.task.scenario import Scenario
 from usm_gym.world import Array, Kernels, World, world_of
 
@@ -32,18 +32,19 @@ MOST_LINK_STEPS = 2_000_000_000
 @compiled
 def observe(fleet, plant, table, robot, lanes):
     """Measure one robot; not a `piece`, which would slow down what it is inlined in."""
-    measure(
-        fleet.blocks[robot // lanes],
-        lanes,
-        robot % lanes,
-        plant,
-        # A robot whose episode has ended may be stepped on until it is restarted.
-        fleet.noise[robot, min(fleet.instant[robot], fleet.noise.shape[1] - 1)],
-        table,
-        fleet.error[robot],
-        fleet.attitude_error[robot],
-        fleet.observation[robot],
-    )
+    row, lane, instant = fleet.blocks[robot // lanes], robot % lanes, fleet.instant[robot]
+    # A robot whose episode has ended may be stepped on until it is restarted.
+    noise = fleet.noise[robot, min(instant, fleet.noise.shape[1] - 1)]
+    error, past = fleet.error[robot], fleet.past[robot]
+    reference = find_error(row, lanes, lane, plant, error)
+    # Before the first measurement arrives, that of the start is known.
+    seen = past[max(instant - fleet.late[robot], 0) % past.shape[0]]
+    kept = past[instant % past.shape[0]]
+    for axis in range(error.size):
+        kept[axis] = error[axis]
+    measured = seen[0] + noise[0], seen[1] + noise[1]
+    angles, observation = fleet.attitude_error[robot], fleet.observation[robot]
+    measure(row, lanes, lane, plant, reference, measured, table, angles, observation)
 
 
 @piece

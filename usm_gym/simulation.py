@@ -29,10 +29,14 @@ class Snapshot:
     Attributes:
         scenarios: The scenarios in progress.
         arrays: The state.
+        past: Position errors that are still to be measured, m, (size, instants, axes).
+        commands: Commands that are still to take effect, (size, periods, thrusters).
     """
 
     scenarios: tuple[Any, ...]
     arrays: dict[str, NDArray[Any]]
+    past: Array
+    commands: NDArray[np.float32]
 
 
 class Simulation:
@@ -87,6 +91,10 @@ class Simulation:
         self.effort, self.limit = np.zeros(self.size), np.zeros(self.size)
         self.lost = np.zeros(self.size, bool)
         self._settled = np.zeros(self.size, np.int64)
+        self._late, self._past = np.zeros(self.size, np.int64), np.zeros((self.size, 1, axes))
+        # Commands that have not taken effect yet; those of period i at i modulo their number.
+        self._wait = np.zeros(self.size, np.int64)
+        self._commands = np.zeros((self.size, 1, self.world.thrusters), np.float32)
         self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, axes))
         self._threads = min(threads, blocks, numba.config.NUMBA_NUM_THREADS)
         self._share_out()
@@ -143,12 +151,16 @@ class Simulation:
         self.limit[index] = scenario.conditions.thruster_limit
         self.lost[index] = False
         self.shared = self.world.shared(scenario, self.shared)
-        noise = scenario.noise()
+        noise, conditions = scenario.noise(), scenario.conditions
+        self._late[index], self._wait[index] = conditions.position_delay, conditions.action_delay
         missing = len(noise) - self._noise.shape[1]
         if missing > 0:
             self._noise = np.pad(self._noise, ((0, 0), (0, missing), (0, 0)))
-            self._share_out()
+        self._past = _with_room(self._past, conditions.position_delay + 1, self.count)
+        self._commands = _with_room(self._commands, conditions.action_delay + 1, self.count)
+        self._share_out()
         self._noise[index, : len(noise)] = noise
+        self._commands[index] = 0.0
         self.world.kernels.observe(
             self.fleet, self.shared, self.layout.kernel_table, index, self._lanes
         )
@@ -161,6 +173,8 @@ class Simulation:
                 [-1, 1] saturate.
         """
         kernels = self.world.kernels
+        if self._commands.shape[1] > 1:
+            action = self._in_effect(action)
         arguments = (self.fleet, self.shared, self.layout.kernel_table, action)
         if self._threads > 1:
             # The number belongs to the calling thread, not to this simulation.
@@ -185,6 +199,8 @@ class Simulation:
         return Snapshot(
             tuple(self.scenarios),
             {name: getattr(self, name).copy() for name in _STATE},
+            self._past.copy(),
+            self._commands.copy(),
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -194,6 +210,14 @@ class Simulation:
                 self.start(index, scenario)
         for name, array in snapshot.arrays.items():
             getattr(self, name)[...] = array
+        self._past, self._commands = snapshot.past.copy(), snapshot.commands.copy()
+        self._share_out()
+
+    def _in_effect(self, action: NDArray[Any]) -> NDArray[Any]:
+        """The commands that take effect now, when these have been given."""
+        robots, periods = np.arange(self.size), self._commands.shape[1]
+        self._commands[robots, self.count % periods] = action
+        return self._commands[robots, (self.count - self._wait) % periods]
 
     def _share_out(self) -> None:
         """Gather what the kernels take; arrays are shared, not copied."""
@@ -201,6 +225,8 @@ class Simulation:
             blocks=self._rows.reshape(len(self._rows), -1),
             instant=self.count,
             noise=self._noise,
+            late=self._late,
+            past=self._past,
             settled=self._settled,
             error=self.error,
             max_error=self.max_error,
@@ -208,6 +234,24 @@ class Simulation:
             effort=self.effort,
             observation=self.observation,
         )
+
+
+def _with_room(kept: NDArray[Any], length: int, count: NDArray[np.int64]) -> NDArray[Any]:
+    """What is kept of the last periods, with room for so many.
+
+    Args:
+        kept: That of period i at i modulo their number, (size, periods, numbers).
+        length: For how many periods there shall be room.
+        count: Periods since the start, (size,).
+    """
+    size, periods, numbers = kept.shape
+    if length <= periods:
+        return kept
+    wider, robots = np.zeros((size, length, numbers), kept.dtype), np.arange(size)
+    for age in range(periods):
+        period = count - age
+        wider[robots, period % length] = kept[robots, period % periods]
+    return wider
 
 
 def _aligned_zeros(shape: tuple[int, ...]) -> Array:

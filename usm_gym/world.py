@@ -33,6 +33,9 @@ class Fleet(NamedTuple):
             for every robot of the block.
         instant: Control periods since the start, int64, (size,).
         noise: Measurement errors of the position, m, (size, control instants, axes).
+        late: By how many control periods the measured position is late, int64, (size,).
+        past: True position errors of the last control instants, m, (size, instants, axes): that of
+            instant i at i modulo their number, which is larger than any `late`.
         settled: Control period from which on errors count, int64, (size,).
         error: True position errors, m, (size, axes).
         max_error: Their largest absolute values since settling, m, (size, axes).
@@ -44,6 +47,8 @@ class Fleet(NamedTuple):
     blocks: Array
     instant: NDArray[np.int64]
     noise: Array
+    late: NDArray[np.int64]
+    past: Array
     settled: NDArray[np.int64]
     error: Array
     max_error: Array

@@ -20,8 +20,9 @@ from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
 
-# The gain of the heading controller, which all laws share.
-HEADING_GAIN = Gain(100.0, "N m/rad", "heading gain k_psi", tuned=(30.0, 300.0))
+# The gain of the heading controller, which all laws share: it is tuned for none of them, so that
+# none buys position with heading.
+HEADING_GAIN = Gain(100.0, "N m/rad", "heading gain k_psi")
 
 
 class ScriptedPolicy:
@@ -46,8 +47,14 @@ class ScriptedPolicy:
     # Whether the law computes with the inertia, drag or plant of the planar robot.
     planar = False
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, *, lag: bool = False, **gains: float) -> None:
         """Take gains other than the defaults by name.
+
+        Args:
+            nominal: What the policy knows of the robot.
+            lag: Whether the applied force that the law is fed lags behind the commands as it
+                nominally does; without it, it is the command itself, as in the paper.
+            gains: Gains other than the defaults, by name.
 
         Raises:
             ValueError: If a gain is not finite, is negative, or is 0 and has to be positive; or if
@@ -61,7 +68,7 @@ class ScriptedPolicy:
             require(value > 0 or not gain.positive, name, value, "a number > 0")
         self.nominal = nominal
         self.gains = self.Gains(*map(float, chosen))
-        self._world, self._model = world_of(nominal.robot), model_of(nominal)
+        self._world, self._model = world_of(nominal.robot), model_of(nominal, lag)
         # Before the law's own numbers stand those that all laws share.
         self._own = shared_size(self._model)
         fitting = isinstance(nominal.robot, Robot) or not self.planar

@@ -38,14 +38,16 @@ class Registration:
         factory: Makes the policy from nominal knowledge; keyword arguments are its gains.
         summary: What it is, in a line.
         space: The gains that are tuned, by name, and where.
-        slow: Whether to leave it out of evaluations unless it is asked for.
+        told: What it is told besides the measured position and the reference.
+        on_request: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
     """
 
     factory: Callable[..., Policy]
     summary: str
     space: Space = field(default_factory=dict)
-    slow: bool = False
+    told: str = "position only"
+    on_request: bool = False
     privileged: bool = False
 
 
@@ -58,7 +60,8 @@ def register(
     summary: str,
     *,
     space: Space | None = None,
-    slow: bool = False,
+    told: str = "position only",
+    on_request: bool = False,
     privileged: bool = False,
 ) -> None:
     """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
@@ -70,7 +73,9 @@ def register(
         summary: What it is, in a line.
         space: The gains that are tuned, by name, and where; without it, as the `Gains` of a
             `ScriptedPolicy` declare, and none of another factory.
-        slow: Whether to leave it out of evaluations unless it is asked for.
+        told: What it is told besides the measured position and the reference.
+        on_request: Whether to leave it out of evaluations unless it is asked for; its tuned form
+            is not left out.
         privileged: Whether it is given true state.
 
     Raises:
@@ -78,7 +83,7 @@ def register(
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    _entries[id] = Registration(factory, summary, chosen, slow, privileged)
+    _entries[id] = Registration(factory, summary, chosen, told, on_request, privileged)
     shipped = TUNED / f"{id}.json"
     if shipped.is_file():
         _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
@@ -120,7 +125,7 @@ def tuned(file: GainsFile) -> Registration:
     return Registration(
         partial(base.factory, **file.gains),
         f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
-        slow=base.slow,
+        told=base.told,
         privileged=base.privileged,
     )
 
@@ -181,12 +186,21 @@ def nominal_knowledge(env: Any) -> Nominal:
     return nominal
 
 
+# What laws are told besides the measured position and the reference.
+LAG = "lag"
+BODY, FORESIGHT = "lag, noise, straight body", "lag, noise, nominal plant, joint references"
+
 register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
 register(
     "sta-explicit",
     partial(SuperTwisting, implicit=False),
     "the same by Euler's forward method, as the paper has it",
     space={},
+)
+register(
+    "sta-shtessel",
+    partial(SuperTwisting, fall=1.0),
+    "super-twisting with the adaptation of Shtessel et al., by which gains fall again",
 )
 register("pd", PD, "PD (21) as a force, the paper's gains")
 register(
@@ -207,15 +221,40 @@ register(
     LADRC,
     "linear active-disturbance rejection: extended-state observer and pole placement",
 )
-register(
-    "lqg", LQG, "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag"
-)
-register("lqg-joints", JointLQG, "the same with the joint motion foreseen by the nominal plant")
-register("mpc", MPC, "predictive control on the nominal plant, joint motion known")
 register("smc", SlidingMode, "sliding mode with boundary layer and integral action")
 register("gsta", GeneralisedSuperTwisting, "generalised super-twisting on the paper's observer")
 register(
     "agsta", AdaptiveGeneralisedSuperTwisting, "the same with the paper's adaptation of its gains"
 )
-register("oracle", Oracle, "the limit: true state, exact plant, the future", privileged=True)
+# Laws that estimate the disturbance from the applied force, once more with the lagging force.
+for _id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "ladrc", "smc", "gsta", "agsta"):
+    _law = _entries[_id]
+    register(
+        f"{_id}-lag",
+        partial(_law.factory, lag=True),
+        f"{_id}, told the thrusters' lag",
+        told=LAG,
+        space=_law.space,
+        on_request=True,
+    )
+register(
+    "lqg",
+    LQG,
+    "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
+    told=BODY,
+)
+register(
+    "lqg-joints",
+    JointLQG,
+    "the same with the joint motion foreseen by the nominal plant",
+    told=FORESIGHT,
+)
+register("mpc", MPC, "predictive control on the nominal plant, joint motion known", told=FORESIGHT)
+register(
+    "oracle",
+    Oracle,
+    "the limit: true state, exact plant, the future",
+    told="everything",
+    privileged=True,
+)
 register("zero", Zero, "no thrust")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import compiled, piece
-from usm_gym.plant.thrusters import allocate
+from usm_gym.plant.thrusters import allocate, lag_shares
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import World, world_of
 
@@ -28,6 +28,8 @@ class Model(NamedTuple):
         thrusters: Number of thrusters.
         mass: Mass of the robot, kg.
         h: Control period, s.
+        lag: Share of the way to its command that a thruster is taken to cover in a period.
+        mean_lag: The mean of that share over a period.
         scale: Physical value over observed value, by number of the observation.
         position_error: Index of the first number of an entry of the observation.
         reference_velocity: The same.
@@ -42,6 +44,8 @@ class Model(NamedTuple):
     thrusters: int
     mass: float
     h: float
+    lag: float
+    mean_lag: float
     scale: Array
     position_error: int
     reference_velocity: int
@@ -73,8 +77,15 @@ class Signals(NamedTuple):
     observation: NDArray[np.float32]
 
 
-def model_of(nominal: Nominal) -> Model:
-    """The nominal knowledge for kernels."""
+def model_of(nominal: Nominal, lag: bool = False) -> Model:
+    """The nominal knowledge for kernels.
+
+    Args:
+        nominal: Nominal knowledge.
+        lag: Whether the applied force is to lag behind the commands as it nominally does.
+    """
+    time_constant = nominal.thruster_time_constant if lag else 0.0
+    share, mean_share = lag_shares(time_constant, nominal.control_period)
     world = world_of(nominal.robot)
     layout = world.layout
     first = {name: place.start for name, place in layout.slices.items()}
@@ -85,6 +96,8 @@ def model_of(nominal: Nominal) -> Model:
         thrusters=world.thrusters,
         mass=world.mass,
         h=nominal.control_period,
+        lag=share,
+        mean_lag=mean_share,
         scale=layout.scale,
         position_error=first["position_error"],
         reference_velocity=first["reference_velocity"],
@@ -103,7 +116,7 @@ def physical(observation, model, index):
 
 @piece
 def commanded(observation, model, thruster):
-    """Last command of a thruster after saturation, N."""
+    """Command of a thruster that is in effect, after saturation, N."""
     limit = physical(observation, model, model.thruster_limit)
     return physical(observation, model, model.thruster_command + thruster) * limit
 
@@ -112,16 +125,24 @@ def commanded(observation, model, thruster):
 def sense(state, model, signals):
     """Fill in the signals from the observations among them and the shared part of the state.
 
-    The applied force is the last command after saturation, projected with the link angles at the
-    time of that command, which the state has kept.
+    The applied force is the mean over the past period of the command in effect, after saturation
+    and what is known of the lag, projected with the link angles at the beginning of the period.
+    These and the thrusters' forces at its end are what the state keeps.
     """
+    mean = np.empty(model.thrusters)
+    forces = 1 + model.axes * model.thrusters
     for b in range(signals.observation.shape[0]):
         seen = signals.observation[b]
         signals.started[b] = state[b, 0]
+        for j in range(model.thrusters):
+            last = state[b, forces + j]
+            way = commanded(seen, model, j) - last
+            mean[j] = last + model.mean_lag * way
+            state[b, forces + j] = last + model.lag * way
         for axis in range(model.axes):
             force = 0.0
             for j in range(model.thrusters):
-                force += state[b, 1 + axis * model.thrusters + j] * commanded(seen, model, j)
+                force += state[b, 1 + axis * model.thrusters + j] * mean[j]
             acceleration = physical(seen, model, model.reference_acceleration + axis)
             signals.y[b, axis] = physical(seen, model, model.position_error + axis)
             signals.velocity[b, axis] = physical(seen, model, model.reference_velocity + axis)
@@ -157,7 +178,7 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
 
 def shared_size(model: Model) -> int:
     """How many numbers of a policy's state `sense` and `act` keep, before the law's own."""
-    return 1 + model.axes * model.thrusters
+    return 1 + (model.axes + 1) * model.thrusters
 
 
 def signals_of(observation: NDArray[np.float32], model: Model, world: World) -> Signals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -29,6 +30,18 @@ class Range:
         """Refuse an empty range, and a logarithmic one that does not stay above 0."""
         require(self.low < self.high, "high", self.high, f"a number > low = {self.low}")
         require(self.low > 0 or not self.log, "low", self.low, "a number > 0 on a log scale")
+
+    @property
+    def middle(self) -> float:
+        """The middle, on the scale of the range."""
+        return math.sqrt(self.low * self.high) if self.log else 0.5 * (self.low + self.high)
+
+    def place(self, value: float) -> float:
+        """Where a value lies, on the scale of the range: 0 at its low end, 1 at its high end."""
+        low, high = self.low, self.high
+        if self.log:
+            low, high, value = math.log(low), math.log(high), math.log(value)
+        return (value - low) / (high - low)
 
 
 Space = Mapping[str, Range]

@@ -49,7 +49,7 @@ def add_to(subparsers: Any) -> None:
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
-    add_policies(parser, default="all, including slow and privileged ones")
+    add_policies(parser, default="all, also those that are no competitors")
     add_scoring(parser)
     add = parser.add_argument
     add("--output", metavar="DIR", help="folder (default: results/VERSION)")

@@ -26,6 +26,6 @@ def run(arguments: argparse.Namespace) -> None:
     table = Table("policy", "what it is", box=None)
     for id in ids():
         policy = entry(id)
-        marks = [mark for mark in ("slow", "privileged") if getattr(policy, mark)]
+        marks = [mark for mark in ("on_request", "privileged") if getattr(policy, mark)]
         table.add_row(id, policy.summary + "".join(f" ({mark})" for mark in marks))
     output_console().print(table)

@@ -15,6 +15,7 @@ from usm_gym.support.files import check_writable, holding, write_json
 from usm_gym.support.provenance import provenance
 from usm_gym.support.text import figures
 from usm_gym.task.conditions import FIELD
+from usm_gym.task.metrics import VARIATION_WEIGHT
 from usm_gym.task.scenario import MODES
 
 DESCRIPTION = """\

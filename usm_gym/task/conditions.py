@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import Field, Strict, TypeAdapter
 
 from usm_gym.robot import Hydrodynamics
 from usm_gym.support.validation import Number, Switch, build, require, validated
@@ -18,6 +18,7 @@ MOST_SUBSTEPS = 10_000
 
 Coefficient = Annotated[Number, Field(ge=0.01, le=100)]
 Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
+Delay = Annotated[int, Strict(), Field(ge=0, le=100)]
 FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
 
 
@@ -37,6 +38,8 @@ class Conditions:
         thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
         thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
         position_noise: Standard deviation of the position measurement, per axis, 0 to 1 m.
+        position_delay: By how many control periods the measured position is late, 0 to 100.
+        action_delay: After how many control periods a command takes effect, 0 to 100.
         current_limit: Largest constant current per axis, 0 to 5 m/s.
         current_variation: Largest amplitude of a sinusoidal current on top of it, 0 to 5 m/s.
         coefficient_range: True hydrodynamic coefficients over the nominal ones, 0.01 to 100.
@@ -52,6 +55,8 @@ class Conditions:
     thruster_time_constant: Annotated[Number, Field(ge=0, le=100)] = 0.05
     thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0
     position_noise: Annotated[Number, Field(ge=0, le=1)] = 5e-5
+    position_delay: Delay = 0
+    action_delay: Delay = 0
     current_limit: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.05
     current_variation: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.0
     coefficient_range: tuple[Coefficient, Coefficient] = (0.8, 1.2)

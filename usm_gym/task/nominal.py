@@ -18,12 +18,16 @@ class Nominal:
         control_period: Time between two actions, s.
         thruster_time_constant: First-order lag of the thrusters, s.
         position_noise: Standard deviation of the position measurement, per axis, m.
+        position_delay: By how many control periods the measured position is late.
+        action_delay: After how many control periods a command takes effect.
     """
 
     robot: Any
     control_period: float
     thruster_time_constant: float
     position_noise: float
+    position_delay: int = 0
+    action_delay: int = 0
 
 
 def shared_nominal(scenarios: Iterable[Any]) -> Nominal:

@@ -40,7 +40,7 @@ class ObservationLayout(Layout):
                 "m",
                 0.01,
                 0.5,
-                "measured position minus its reference (x, y), global frame",
+                "position minus its reference (x, y) at the time of measurement, global frame",
             ),
             Entry("reference_velocity", 2, "m/s", 0.1, 5.0, "velocity of the reference (x, y)"),
             Entry(
@@ -79,7 +79,7 @@ class ObservationLayout(Layout):
                 "1",
                 1.0,
                 1.1,
-                "last command over the thruster limit, after saturation",
+                "command in effect over the thruster limit, after saturation",
             ),
             Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest force of a thruster"),
         )
@@ -97,28 +97,47 @@ def number(row, lanes, lane, index):
 
 
 @piece
-def measure(row, lanes, lane, plant, noise, table, error, attitude_error, observation):
-    """Fill in the true errors and the observation of one robot.
+def find_error(row, lanes, lane, plant, error):
+    """Fill in the true position error of one robot, m, (2,).
+
+    Returns:
+        The reference (p_x, p_y, v_x, v_y, a_x, a_y).
+    """
+    guidance = body_rows(plant.links, plant.thruster_links.size)
+    reference = path(
+        number(row, lanes, lane, CLOCK) * plant.h,
+        number(row, lanes, lane, guidance + SPEED),
+        number(row, lanes, lane, guidance + SWAY),
+        number(row, lanes, lane, guidance + FREQUENCY),
+        number(row, lanes, lane, guidance + RAMP),
+    )
+    error[0] = number(row, lanes, lane, P_X) - reference[0]
+    error[1] = number(row, lanes, lane, P_Y) - reference[1]
+    return reference
+
+
+@piece
+def measure(row, lanes, lane, plant, reference, measured, table, attitude_error, observation):
+    """Fill in the observation of one robot.
 
     Args:
         row: Block of the robot.
         lanes: Robots in a block.
         lane: Place of the robot in its block.
         plant: What all robots share.
-        noise: Measurement error of the position now, m, (2,).
+        reference: What `find_error` has returned.
+        measured: Position error as it is measured, m, (2,).
         table: Table of the observation.
-        error: Where to write the true position error, m, (2,).
         attitude_error: Where to write the heading error as it is known on board, rad, (1,).
         observation: Where to write the observation.
     """
     links, guidance = plant.links, body_rows(plant.links, plant.thruster_links.size)
-    t = number(row, lanes, lane, CLOCK) * plant.h
-    p_y = measure_position(row, lanes, lane, guidance, t, noise, table, error, observation)
+    measure_position(reference, measured, table, observation)
     mean, head = measure_links(row, lanes, lane, links, table, observation)
     heading = head if number(row, lanes, lane, guidance + HEAD_HEADING) > 0.0 else mean
-    distance = number(row, lanes, lane, P_Y) + noise[1]
-    if number(row, lanes, lane, guidance + CROSS_TRACK) > 0.0:
-        distance -= p_y
+    distance = measured[1]
+    if number(row, lanes, lane, guidance + CROSS_TRACK) == 0.0:
+        distance += reference[1]
     look_ahead = number(row, lanes, lane, guidance + LOOK_AHEAD)
     attitude_error[0] = heading - line_of_sight(distance, look_ahead)
     k = table.starts[ENTRY.heading_error]
@@ -129,28 +148,19 @@ def measure(row, lanes, lane, plant, noise, table, error, attitude_error, observ
 
 
 @piece
-def measure_position(row, lanes, lane, guidance, t, noise, table, error, observation):
-    """Fill in the position error and what is known of the reference; returns its y."""
+def measure_position(reference, measured, table, observation):
+    """Fill in the measured position error and what is known of the reference."""
     starts, gain, _ = table
-    p_x, p_y, v_x, v_y, a_x, a_y = path(
-        t,
-        number(row, lanes, lane, guidance + SPEED),
-        number(row, lanes, lane, guidance + SWAY),
-        number(row, lanes, lane, guidance + FREQUENCY),
-        number(row, lanes, lane, guidance + RAMP),
-    )
-    error[0] = number(row, lanes, lane, P_X) - p_x
-    error[1] = number(row, lanes, lane, P_Y) - p_y
+    _, _, v_x, v_y, a_x, a_y = reference
     k = starts[ENTRY.position_error]
-    observation[k] = (error[0] + noise[0]) * gain[k]
-    observation[k + 1] = (error[1] + noise[1]) * gain[k + 1]
+    observation[k] = measured[0] * gain[k]
+    observation[k + 1] = measured[1] * gain[k + 1]
     k = starts[ENTRY.reference_velocity]
     observation[k] = v_x * gain[k]
     observation[k + 1] = v_y * gain[k + 1]
     k = starts[ENTRY.reference_acceleration]
     observation[k] = a_x * gain[k]
     observation[k + 1] = a_y * gain[k + 1]
-    return p_y
 
 
 @piece

@@ -207,6 +207,8 @@ class Scenario:
             control_period=conditions.control_period,
             thruster_time_constant=conditions.thruster_time_constant,
             position_noise=conditions.position_noise,
+            position_delay=conditions.position_delay,
+            action_delay=conditions.action_delay,
         )
 
     @property

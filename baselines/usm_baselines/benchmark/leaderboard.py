@@ -173,7 +173,7 @@ def suites() -> dict[str, list[Scenario]]:
 
 
 def everyone() -> list[Contender]:
-    """All registered policies, also those that are slow or no competitors."""
+    """All registered policies, also those on request and no competitors."""
     return [contender(id) for id in ids()]
 
 

@@ -1,9 +1,11 @@
 """Tuning of gains by Optuna, on sampled training scenarios only.
 
 The scenarios come from the stream TUNING of a seed, and the check afterwards from the stream
-VALIDATION; nothing here can reach a frozen suite. Trials are asked for in rounds of a fixed size
-and the sampler is seeded anew for every round, so that the result is the same for any number of
-workers and for a tuning that was interrupted.
+VALIDATION; nothing here can reach a frozen suite. In some of them the vehicle reacts later than
+the policy is told, so that no gains are chosen that live on the margin of stability. Every search
+starts from the middle of its ranges, whatever gains the policy has of its own. Trials are asked
+for in rounds of a fixed size and the sampler is seeded anew for every round, so that the result is
+the same for any number of workers and for a tuning that was interrupted.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import optuna
@@ -42,6 +44,9 @@ from usm_gym.task.scenario import Mode, Scenario
 
 # Trials asked for at once, from what is known before all of them.
 ROUND = 8
+# In every so many-th scenario commands take effect a period late and thrusters lag more, by a
+# factor; the policy is not told.
+MARGIN_EVERY, MARGIN_DELAY, MARGIN_LAG = 4, 1, 1.3
 # Objective of a trial that has no score, mm.
 FAILED = 1e4
 # Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.
@@ -97,7 +102,7 @@ class Problem:
         return f"{self.policy}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
     def scenarios(self, purpose: int) -> tuple[Scenario, ...]:
-        """Scenarios for tuning, or for the check of its result."""
+        """Scenarios for tuning, or for the check of its result, as the policy is told of them."""
         require(purpose in (TUNING, VALIDATION), "purpose", purpose, "TUNING or VALIDATION")
         return tuple(
             sample(self.mode, self.conditions, stream(self.seed, purpose, episode))
@@ -105,11 +110,15 @@ class Problem:
         )
 
     def job(self, gains: dict[str, float], purpose: int) -> Job:
-        """The policy with some gains on these scenarios."""
+        """The policy with some gains on these scenarios, some of which are worse than told."""
         file = GainsFile(self.policy, gains, self.budget, self.weight)
-        scenarios = self.scenarios(purpose)
         contender = registered(self.policy, tuned(file))
-        return Job(contender, scenarios, shared_nominal(scenarios))
+        told = self.scenarios(purpose)
+        met = [
+            later(scenario) if episode % MARGIN_EVERY == MARGIN_EVERY - 1 else scenario
+            for episode, scenario in enumerate(told)
+        ]
+        return Job(contender, tuple(met), shared_nominal(told))
 
 
 @dataclass(frozen=True)
@@ -129,6 +138,17 @@ class Optimum:
     start: float
     validation: float
     pruned: int
+
+
+def later(scenario: Scenario) -> Scenario:
+    """The same scenario, in which the vehicle reacts later."""
+    conditions = scenario.conditions
+    changed = replace(
+        conditions,
+        action_delay=conditions.action_delay + MARGIN_DELAY,
+        thruster_time_constant=MARGIN_LAG * conditions.thruster_time_constant,
+    )
+    return replace(scenario, conditions=changed)
 
 
 def objective(outcome: Evaluation | Refusal, weight: float = VARIATION_WEIGHT) -> float:
@@ -231,7 +251,8 @@ def _search(
             constant_liar=True,
         )
         if done == 0 and not study.get_trials(deepcopy=False, states=[TrialState.WAITING]):
-            study.enqueue_trial(_start(problem))
+            middle = {name: span.middle for name, span in problem.space.items()}
+            study.enqueue_trial(middle)
         _round(study, problem, min(ROUND, problem.budget.trials - done), workers)
         progress(_finished(study), study.best_value)
 
@@ -287,18 +308,6 @@ def _joined(first: Evaluation | Refusal, second: Evaluation | Refusal) -> Evalua
     if isinstance(first, Refusal):
         return first
     return second if isinstance(second, Refusal) else joined([first, second])
-
-
-def _start(problem: Problem) -> dict[str, float]:
-    """The policy's own gains, as far as they lie in the space."""
-    job = problem.job({}, TUNING)
-    gains = getattr(job.contender.make(job.nominal), "gains", None)
-    own = {} if gains is None else gains._asdict()
-    return {
-        name: min(max(own[name], span.low), span.high)
-        for name, span in problem.space.items()
-        if name in own
-    }
 
 
 def _finished(study: Study) -> int:

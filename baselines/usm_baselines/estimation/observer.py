@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from usm_baselines.space import Gain
 from usm_gym.kernels.compile import piece
 from usm_gym.kernels.elementary import cube_root
 from usm_gym.support.validation import require
@@ -18,6 +19,15 @@ NAMES = ("error", "rate", "disturbance", "root")
 ERROR, RATE, DISTURBANCE, ROOT = range(len(NAMES))
 # Exponent of L in k2: that printed in the paper, and the one that homogeneity asks for.
 PRINTED, HOMOGENEOUS = 0.5, 2 / 3
+# The gains of the observer, which all laws on it share; the defaults are those of the paper.
+OBSERVER_GAIN = Gain(
+    55.0,
+    "m/s^3",
+    "L of the observer; bounds the rate of the disturbance",
+    tuned=(1e-3, 1e4),
+    positive=True,
+)
+K2_EXPONENT = Gain(PRINTED, "1", "exponent of L in k2: 0.5 as printed, or 2/3")
 
 
 def check_exponent(k2_exponent: float) -> None:

@@ -6,8 +6,7 @@ state are met as well:
     u = -k_1 phi_1(sigma) + v,   v' = -k_2 phi_2(sigma),
     phi_1 = |sigma|^(1/2) sgn(sigma) + linear sigma,   phi_2 = phi_1' phi_1.
 
-Sliding variable, observer and compensation are those of the paper, (10) and (15)-(19), the
-observer with its homogeneous exponent.
+Sliding variable, observer and compensation are those of the paper, (10) and (15)-(19).
 
 Sources: J. A. Moreno, A linear framework for the robust stability analysis of a generalized
 super-twisting algorithm, CCE 2009. I. Castillo, L. Fridman, J. A. Moreno, Super-twisting algorithm
@@ -22,8 +21,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from usm_baselines.estimation.observer import ERROR, HOMOGENEOUS, RATE, observe, observer_gains
-from usm_baselines.laws.super_twisting import ALPHA, INTEGRAL, STATE, adapt, compensating_force
+from usm_baselines.estimation.observer import (
+    ERROR,
+    K2_EXPONENT,
+    OBSERVER_GAIN,
+    RATE,
+    check_exponent,
+    observe,
+    observer_gains,
+)
+from usm_baselines.laws.super_twisting import (
+    ALPHA,
+    ALPHA_START,
+    BETA_OFFSET,
+    DEAD_ZONE,
+    EPSILON,
+    INTEGRAL,
+    OMEGA,
+    STATE,
+    SURFACE,
+    adapt,
+    compensating_force,
+)
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
@@ -31,10 +50,9 @@ from usm_gym.kernels.compile import compiled, piece
 from usm_gym.task.nominal import Nominal
 
 # What both forms share.
-OBSERVER_GAIN = Gain(25.0, "m/s^3", "L of the observer", tuned=(1e-2, 100.0), positive=True)
-SURFACE = Gain(0.6, "1/s", "lambda of (10)", tuned=(0.3, 30.0))
+SLOPE = Gain(0.6, "1/s", "lambda of (10)", tuned=SURFACE)
 LINEAR = Gain(
-    50.0, "(s/m)^(1/2)", "weight of the linear term beside the square root", tuned=(0.1, 100.0)
+    50.0, "(s/m)^(1/2)", "weight of the linear term beside the square root", tuned=(0.1, 1e4)
 )
 
 
@@ -42,28 +60,31 @@ class GeneralisedGains(NamedTuple):
     """Gains of the generalised super-twisting controller."""
 
     observer_gain: float = OBSERVER_GAIN
-    surface: float = SURFACE
+    k2_exponent: float = K2_EXPONENT
+    surface: float = SLOPE
     linear: float = LINEAR
     heading_gain: float = HEADING_GAIN
-    k_1: float = Gain(0.02, "(m/s)^(1/2)/s", "gain of the proportional half", tuned=(1e-3, 10.0))
-    k_2: float = Gain(0.015, "m/s^2", "gain of the integral half", tuned=(1e-4, 10.0))
+    k_1: float = Gain(0.02, "(m/s)^(1/2)/s", "gain of the proportional half", tuned=ALPHA_START)
+    k_2: float = Gain(0.015, "m/s^2", "gain of the integral half", tuned=BETA_OFFSET)
 
 
 class AdaptiveGains(NamedTuple):
     """Gains of the adaptive form: k_1 is alpha and k_2 is beta of (12)-(14) of the paper."""
 
     observer_gain: float = OBSERVER_GAIN
-    surface: float = SURFACE
+    k2_exponent: float = K2_EXPONENT
+    surface: float = SLOPE
     linear: float = LINEAR
     heading_gain: float = HEADING_GAIN
-    epsilon: float = Gain(0.01, "(m/s)^(1/2)/s", "epsilon of (13)", tuned=(1e-3, 1.0))
-    beta_offset: float = Gain(0.015, "m/s^2", "lambda of (13)")
+    epsilon: float = Gain(0.01, "(m/s)^(1/2)/s", "epsilon of (13)", tuned=EPSILON)
+    beta_offset: float = Gain(0.015, "m/s^2", "lambda of (13)", tuned=BETA_OFFSET)
     gamma: float = Gain(1.0, "1", "gamma_1 of (12)")
-    omega: float = Gain(0.01, "(m/s)^(1/2)/s^2", "omega_1 of (12)", tuned=(1e-3, 10.0))
+    omega: float = Gain(0.01, "(m/s)^(1/2)/s^2", "omega_1 of (12)", tuned=OMEGA)
     dead_zone: float = Gain(
-        0.03, "m/s", "alpha_m of (14): below it alpha keeps still", tuned=(1e-4, 0.1)
+        0.03, "m/s", "alpha_m of (14): below it alpha does not grow", tuned=DEAD_ZONE
     )
-    alpha_start: float = Gain(0.02, "(m/s)^(1/2)/s", "alpha at the start")
+    alpha_start: float = Gain(0.02, "(m/s)^(1/2)/s", "alpha at the start", tuned=ALPHA_START)
+    fall: float = Gain(0.0, "1", "how fast alpha falls inside the dead zone, as in `sta`")
 
 
 @piece
@@ -99,7 +120,7 @@ def implicit_generalised(sigma, h, k_1, k_2, linear, state):
 @compiled
 def generalised_super_twisting(signals, h, mass, gains, state, force):
     """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
-    k = observer_gains(gains.observer_gain, HOMOGENEOUS)
+    k = observer_gains(gains.observer_gain, gains.k2_exponent)
     for b, axis in np.ndindex(force.shape):
         own, started = state[b, axis], signals.started[b]
         y, u = signals.y[b, axis], signals.u[b, axis]
@@ -120,9 +141,10 @@ class AdaptiveGeneralisedSuperTwisting(ScriptedPolicy):
     Gains: type[Any] = AdaptiveGains
     state = STATE
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Take gains other than the defaults by name."""
         super().__init__(nominal, **gains)
+        check_exponent(self.gains.k2_exponent)
         self._adaptive = self.gains
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
@@ -136,12 +158,13 @@ class GeneralisedSuperTwisting(AdaptiveGeneralisedSuperTwisting):
 
     Gains = GeneralisedGains
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Take gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         own = self.gains
         self._adaptive = AdaptiveGains(
             observer_gain=own.observer_gain,
+            k2_exponent=own.k2_exponent,
             surface=own.surface,
             linear=own.linear,
             heading_gain=own.heading_gain,

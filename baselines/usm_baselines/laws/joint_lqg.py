@@ -7,7 +7,7 @@ one that would take the linear model, its last command held, to where the nomina
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class JointLQGGains(NamedTuple):
         1e-2,
         "m/s^2 / sqrt(Hz)",
         "spectral density of the noise on the acceleration",
-        tuned=(1e-4, 1e-1),
+        tuned=(1e-5, 1.0),
         positive=True,
     )
     # The nominal plant leaves less to the disturbance than the straight body of `lqg`.
@@ -37,19 +37,19 @@ class JointLQGGains(NamedTuple):
         0.05,
         "m/s^3 / sqrt(Hz)",
         "spectral density of the noise that drives the disturbance",
-        tuned=(1e-3, 1.0),
+        tuned=(1e-4, 100.0),
         positive=True,
     )
     variation_weight: float = Gain(
         5e-5,
         "m/N",
         "error that is as bad as a change of the force by 1 N in a period",
-        tuned=(1e-6, 1e-2),
+        tuned=(1e-7, 1e-1),
         positive=True,
     )
     heading_gain: float = HEADING_GAIN
     lead: float = Gain(
-        0.08, "s", "how far ahead the disturbance is foreseen", tuned=(0.02, 0.3), positive=True
+        0.08, "s", "how far ahead the disturbance is foreseen", tuned=(0.02, 0.5), positive=True
     )
 
 
@@ -88,7 +88,7 @@ class JointLQG(LQG):
     Gains = JointLQGGains
     state = prediction.NAMES
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         self._periods = max(1, round(self.gains.lead / nominal.control_period))

@@ -15,7 +15,7 @@ model).
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,24 +36,24 @@ class MPCGains(NamedTuple):
         1e-2,
         "m/s^2 / sqrt(Hz)",
         "spectral density of the noise on the acceleration",
-        tuned=(1e-4, 1e-1),
+        tuned=(1e-5, 1.0),
         positive=True,
     )
     disturbance_noise: float = Gain(
         0.05,
         "m/s^3 / sqrt(Hz)",
         "spectral density of the noise that drives the disturbance",
-        tuned=(1e-3, 1.0),
+        tuned=(1e-4, 100.0),
         positive=True,
     )
     variation_weight: float = Gain(
         5e-5,
         "m/N",
         "error that is as bad as a change of the force by 1 N in a period",
-        tuned=(1e-6, 1e-3),
+        tuned=(1e-7, 1e-1),
         positive=True,
     )
-    horizon: float = Gain(0.2, "s", "how far it looks ahead", positive=True)
+    horizon: float = Gain(0.2, "s", "how far it looks ahead", tuned=(0.04, 0.5), positive=True)
     heading_gain: float = HEADING_GAIN
 
 
@@ -104,7 +104,7 @@ class MPC(ScriptedPolicy):
     shown = ("rate", "unmodelled")
     planar = True
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         linear = kalman.linear_model(

@@ -42,7 +42,7 @@ class Oracle(ScriptedPolicy):
     privileged = True
     planar = True
 
-    def __init__(self, nominal: Nominal, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gain of the regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         self._inertia, drag = kalman.straight_body(nominal.robot)

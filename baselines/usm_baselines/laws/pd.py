@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from usm_baselines.estimation import observer
-from usm_baselines.estimation.observer import ERROR, RATE, check_exponent, observe, observer_gains
-from usm_baselines.laws.super_twisting import compensating_force
+from usm_baselines.estimation.observer import (
+    ERROR,
+    K2_EXPONENT,
+    OBSERVER_GAIN,
+    RATE,
+    check_exponent,
+    observe,
+    observer_gains,
+)
+from usm_baselines.laws.super_twisting import SURFACE, compensating_force
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain, Range, Space, space_of
@@ -27,12 +35,10 @@ class PDGains(NamedTuple):
     In the readings "mass" and "observer" k_p is in 1/s^2 and k_d in 1/s.
     """
 
-    k_p: float = Gain(200.0, "N/m", "proportional gain", tuned=(30.0, 30000.0))
-    k_d: float = Gain(6.0, "N s/m", "derivative gain", tuned=(10.0, 3000.0))
-    observer_gain: float = Gain(
-        55.0, "m/s^3", "L of the observer", tuned=(1e-2, 1000.0), positive=True
-    )
-    k2_exponent: float = Gain(0.5, "1", "exponent of L in k2: 0.5 as printed, or 2/3")
+    k_p: float = Gain(200.0, "N/m", "proportional gain", tuned=(10.0, 1e5))
+    k_d: float = Gain(6.0, "N s/m", "derivative gain", tuned=(1.0, 1e4))
+    observer_gain: float = OBSERVER_GAIN
+    k2_exponent: float = K2_EXPONENT
     surface: float = Gain(1.0, "1/s", 'lambda of (19); for the reading "observer" only')
     heading_gain: float = HEADING_GAIN
 
@@ -42,14 +48,14 @@ SPACES: dict[Reading, Space] = {
     "force": space_of(PDGains),
     "mass": space_of(
         PDGains,
-        k_p=Range(3.0, 3000.0, "1/s^2"),
-        k_d=Range(1.0, 300.0, "1/s"),
+        k_p=Range(1.0, 1e4, "1/s^2"),
+        k_d=Range(0.1, 1e3, "1/s"),
     ),
     "observer": space_of(
         PDGains,
-        k_p=Range(0.3, 300.0, "1/s^2"),
-        k_d=Range(0.1, 30.0, "1/s"),
-        surface=Range(0.1, 30.0, "1/s"),
+        k_p=Range(0.1, 1e3, "1/s^2"),
+        k_d=Range(0.01, 100.0, "1/s"),
+        surface=Range(*SURFACE, "1/s"),
     ),
 }
 
@@ -101,7 +107,7 @@ class PD(ScriptedPolicy):
     state = observer.NAMES
     shown = ("rate", "disturbance")
 
-    def __init__(self, nominal: Nominal, reading: Reading = "force", **gains: float) -> None:
+    def __init__(self, nominal: Nominal, reading: Reading = "force", **gains: Any) -> None:
         """Take a reading, and gains other than the paper's by name."""
         super().__init__(nominal, **gains)
         check_exponent(self.gains.k2_exponent)

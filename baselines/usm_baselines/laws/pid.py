@@ -20,11 +20,11 @@ from usm_gym.kernels.compile import compiled, piece
 class PIDGains(NamedTuple):
     """Gains of the PID controller."""
 
-    k_p: float = Gain(1300.0, "N/m", "proportional gain", tuned=(30.0, 30000.0))
-    k_i: float = Gain(10000.0, "N/(m s)", "integral gain", tuned=(10.0, 100000.0))
-    k_d: float = Gain(400.0, "N s/m", "derivative gain", tuned=(10.0, 3000.0), positive=True)
+    k_p: float = Gain(1300.0, "N/m", "proportional gain", tuned=(10.0, 1e5))
+    k_i: float = Gain(10000.0, "N/(m s)", "integral gain", tuned=(10.0, 1e6))
+    k_d: float = Gain(400.0, "N s/m", "derivative gain", tuned=(1.0, 1e4), positive=True)
     derivative_time: float = Gain(
-        0.003, "s", "time constant of the derivative's filter", tuned=(1e-3, 0.3)
+        0.003, "s", "time constant of the derivative's filter", tuned=(1e-4, 1.0)
     )
     heading_gain: float = HEADING_GAIN
 

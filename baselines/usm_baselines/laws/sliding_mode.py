@@ -10,28 +10,37 @@ Source: J.-J. E. Slotine, W. Li, Applied Nonlinear Control, 1991, chapter 7.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from usm_baselines.estimation import observer
-from usm_baselines.estimation.observer import ERROR, HOMOGENEOUS, RATE, observe, observer_gains
+from usm_baselines.estimation.observer import (
+    ERROR,
+    K2_EXPONENT,
+    OBSERVER_GAIN,
+    RATE,
+    check_exponent,
+    observe,
+    observer_gains,
+)
+from usm_baselines.laws.super_twisting import SURFACE
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
+from usm_gym.task.nominal import Nominal
 
 
 class SlidingModeGains(NamedTuple):
     """Gains of the sliding-mode controller."""
 
-    observer_gain: float = Gain(
-        90.0, "m/s^3", "L of the observer", tuned=(1e-2, 1000.0), positive=True
-    )
-    surface: float = Gain(14.0, "1/s", "lambda", tuned=(0.3, 30.0), positive=True)
-    eta: float = Gain(0.8, "m/s^2", "acceleration of the switching term", tuned=(1e-2, 10.0))
+    observer_gain: float = OBSERVER_GAIN
+    k2_exponent: float = K2_EXPONENT
+    surface: float = Gain(14.0, "1/s", "lambda", tuned=SURFACE, positive=True)
+    eta: float = Gain(0.8, "m/s^2", "acceleration of the switching term", tuned=(1e-2, 100.0))
     boundary: float = Gain(
-        0.7, "m/s", "half the width of the boundary layer", tuned=(1e-4, 1.0), positive=True
+        0.7, "m/s", "half the width of the boundary layer", tuned=(1e-4, 100.0), positive=True
     )
     heading_gain: float = HEADING_GAIN
 
@@ -50,7 +59,7 @@ def switching(s, boundary, eta):
 @compiled
 def sliding_mode(signals, h, mass, gains, state, force):
     """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
-    k = observer_gains(gains.observer_gain, HOMOGENEOUS)
+    k = observer_gains(gains.observer_gain, gains.k2_exponent)
     surface = gains.surface
     for b, axis in np.ndindex(force.shape):
         own, started, y = state[b, axis], signals.started[b], signals.y[b, axis]
@@ -72,6 +81,11 @@ class SlidingMode(ScriptedPolicy):
 
     Gains = SlidingModeGains
     state = STATE
+
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
+        """Take gains other than the defaults by name."""
+        super().__init__(nominal, **gains)
+        check_exponent(self.gains.k2_exponent)
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
         """The law."""

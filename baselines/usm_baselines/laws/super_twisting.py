@@ -1,8 +1,12 @@
-"""The adaptive super-twisting controller, equations (10)-(14) and (18)-(20) of the paper."""
+"""The adaptive super-twisting controller, equations (10)-(14) and (18)-(20) of the paper.
+
+The adaptation (14) lets alpha grow, and never fall. That of its source does: Y. Shtessel, M. Taleb,
+F. Plestan, A novel adaptive-gain supertwisting sliding mode controller, Automatica 48, 2012.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,50 +14,56 @@ from usm_baselines.estimation import observer
 from usm_baselines.estimation.observer import (
     DISTURBANCE,
     ERROR,
+    K2_EXPONENT,
+    OBSERVER_GAIN,
     RATE,
     check_exponent,
     observe,
     observer_gains,
 )
-from usm_baselines.policy import ScriptedPolicy
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 
+# Where the gains of the sliding variable and of the adaptation are tuned, in every law.
+SURFACE, EPSILON, BETA_OFFSET = (0.1, 100.0), (1e-5, 10.0), (1e-5, 10.0)
+OMEGA, DEAD_ZONE, ALPHA_START = (1e-5, 10.0), (1e-5, 1.0), (1e-3, 10.0)
+
 
 class SuperTwistingGains(NamedTuple):
     """Gains of the adaptive super-twisting controller, those of section 5.2.1 by default."""
 
-    observer_gain: float = Gain(
-        55.0,
-        "m/s^3",
-        "L of the observer; bounds the rate of the disturbance",
-        tuned=(1e-2, 100.0),
-        positive=True,
-    )
-    k2_exponent: float = Gain(0.5, "1", "exponent of L in k2: 0.5 as printed, or 2/3")
-    surface: float = Gain(1.0, "1/s", "lambda of the sliding variable (10)", tuned=(0.3, 30.0))
-    epsilon: float = Gain(1.0, "(m/s)^(1/2)/s", "epsilon of (13)", tuned=(1e-3, 1.0))
+    observer_gain: float = OBSERVER_GAIN
+    k2_exponent: float = K2_EXPONENT
+    surface: float = Gain(1.0, "1/s", "lambda of the sliding variable (10)", tuned=SURFACE)
+    epsilon: float = Gain(1.0, "(m/s)^(1/2)/s", "epsilon of (13)", tuned=EPSILON)
     beta_offset: float = Gain(
         1.0,
         "m/s^2",
         "lambda of (13), to which the paper gives the same letter as to that of (10)",
-        tuned=(1e-4, 10.0),
+        tuned=BETA_OFFSET,
     )
     gamma: float = Gain(1.0, "1", "gamma_1 of (12)")
-    omega: float = Gain(8.0, "(m/s)^(1/2)/s^2", "omega_1 of (12)", tuned=(1e-3, 10.0))
+    omega: float = Gain(8.0, "(m/s)^(1/2)/s^2", "omega_1 of (12)", tuned=OMEGA)
     dead_zone: float = Gain(
-        0.05, "m/s", "alpha_m of (14): below it alpha keeps still", tuned=(1e-4, 0.1)
+        0.05, "m/s", "alpha_m of (14): below it alpha does not grow", tuned=DEAD_ZONE
     )
     alpha_start: float = Gain(
         0.0,
         "(m/s)^(1/2)/s",
-        "alpha at the start, which the paper does not print",
-        tuned=(1e-2, 10.0),
+        "alpha at the start, which the paper does not print, and the least it falls to",
+        tuned=ALPHA_START,
     )
-    heading_gain: float = Gain(100.0, "N m/rad", "heading gain k_psi")
+    fall: float = Gain(
+        0.0,
+        "1",
+        "how fast alpha falls inside the dead zone, over how fast it grows outside: 0 as in (14), "
+        "1 as in the law of Shtessel et al.",
+    )
+    heading_gain: float = HEADING_GAIN
 
 
 # The observer's numbers; v of (11), m/s^2; alpha, m^(1/2)/s^(3/2).
@@ -63,10 +73,15 @@ STATE = (*observer.NAMES, "integral", "alpha")
 
 @piece
 def adapt(sigma, alpha, h, gains):
-    """(beta, next alpha) of (12)-(14); alpha grows while |sigma| is outside the dead zone."""
+    """(beta, next alpha) of (12)-(14); alpha grows while |sigma| is outside the dead zone.
+
+    Inside it falls, if it does, down to where it has started.
+    """
     beta = 2.0 * gains.epsilon * alpha + gains.beta_offset + 4.0 * gains.epsilon * gains.epsilon
-    growth = gains.omega * np.sqrt(gains.gamma / 2.0) if abs(sigma) > gains.dead_zone else 0.0
-    return beta, alpha + h * growth
+    change = h * (gains.omega * np.sqrt(gains.gamma / 2.0))
+    if abs(sigma) > gains.dead_zone:
+        return beta, alpha + change
+    return beta, max(alpha - gains.fall * change, min(alpha, gains.alpha_start))
 
 
 @piece
@@ -164,7 +179,7 @@ class SuperTwisting(ScriptedPolicy):
     state = STATE
     shown = ("rate", "disturbance", "integral", "alpha")
 
-    def __init__(self, nominal: Nominal, implicit: bool = True, **gains: float) -> None:
+    def __init__(self, nominal: Nominal, implicit: bool = True, **gains: Any) -> None:
         """Take gains other than the paper's by name, and whether to discretise implicitly."""
         super().__init__(nominal, **gains)
         check_exponent(self.gains.k2_exponent)
