@@ -217,7 +217,8 @@ class Simulation:
         """The commands that take effect now, when these have been given."""
         robots, periods = np.arange(self.size), self._commands.shape[1]
         self._commands[robots, self.count % periods] = action
-        return self._commands[robots, (self.count - self._wait) % periods]
+        in_effect: NDArray[Any] = self._commands[robots, (self.count - self._wait) % periods]
+        return in_effect
 
     def _share_out(self) -> None:
         """Gather what the kernels take; arrays are shared, not copied."""

@@ -12,6 +12,11 @@ from usm_baselines.laws.pd import SPACES, PDGains
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.space import Gain, Range, declared, space_of
 
+from usm_gym import suite
+
+
+OBSERVER = "observer_gain"
+
 
 class Gains(NamedTuple):
     stiffness: float = Gain(200.0, "N/m", "force over error", tuned=(30.0, 3000.0), positive=True)
@@ -59,6 +64,34 @@ def test_a_law_is_registered_with_the_space_that_it_declares(
     assert registry.entry("declared").space == space_of(Gains)
     assert registry.entry("own").space == own
     assert registry.entry("none").space == registry.entry("foreign").space == {}
+
+
+def test_where_a_value_lies_in_a_range() -> None:
+    log, linear = Range(1e-2, 1e2, "1"), Range(0.0, 4.0, "1", log=False)
+    for span, middle in ((log, 1.0), (linear, 2.0)):
+        assert span.middle == pytest.approx(middle)
+        places = [span.place(value) for value in (span.low, span.middle, span.high)]
+        assert places == pytest.approx([0.0, 0.5, 1.0])
+
+
+def test_laws_with_the_same_gain_look_for_it_in_the_same_range() -> None:
+    spaces = {id: registry.entry(id).space for id in registry.ids()}
+    observers = {id: space["observer_gain"] for id, space in spaces.items() if OBSERVER in space}
+    assert len(observers) == 16  # eight laws, told the lag or not
+    shared = {OBSERVER, "acceleration_noise", "disturbance_noise", "variation_weight"}
+    shared |= {"epsilon", "beta_offset", "omega", "dead_zone", "alpha_start"}
+    for gain in shared:
+        assert len({space[gain] for space in spaces.values() if gain in space}) == 1, gain
+    for id, space in spaces.items():
+        assert not {"heading_gain", "k2_exponent"} & set(space), id
+
+
+def test_laws_on_the_papers_observer_have_its_gains_and_its_exponent() -> None:
+    nominal = suite("operation")[0].nominal
+    for id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "smc", "gsta", "agsta"):
+        for name in (id, f"{id}-lag", f"{id}-tuned", f"{id}-lag-tuned"):
+            assert usm_baselines.make(name, nominal).gains.k2_exponent == 0.5, name
+        assert usm_baselines.make(id, nominal).gains.observer_gain == 55.0, id
 
 
 def test_the_readings_of_the_pd_controller_are_tuned_in_units_of_their_own() -> None:

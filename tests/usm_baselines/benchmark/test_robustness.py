@@ -8,6 +8,7 @@ from usm_baselines.benchmark.scoring import Refusal, score_all
 from usm_baselines.contender import contender
 
 from usm_gym import suite
+from usm_gym.task.conditions import FIELD
 from usm_gym.task.nominal import shared_nominal
 
 SCENARIOS = suite("operation")[:2]
@@ -40,6 +41,15 @@ def test_the_suites_own_value_changes_nothing_and_another_one_thing(
             assert changed.water == scenario.water
         if name not in ("speed", "amplitude"):
             assert changed.inspection == scenario.inspection
+
+
+def test_a_delay_is_that_of_the_commands() -> None:
+    quantity = QUANTITIES["delay"]
+    for scenario in SCENARIOS:
+        assert quantity.vary(scenario, 0.0) == scenario
+        assert quantity.vary(scenario, 3.0).conditions == replace(FIELD, action_delay=3)
+        with pytest.raises(ValueError, match="delay"):
+            quantity.vary(scenario, 0.5)
 
 
 def test_policies_keep_the_nominal_knowledge_but_know_their_period() -> None:

@@ -22,6 +22,7 @@ from usm_baselines.benchmark.tuning import Problem, objective, tune
 from usm_baselines.gains import Budget
 from usm_baselines.space import Range
 
+import usm_gym
 from usm_gym import suites
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION
@@ -33,6 +34,7 @@ SPACE = {
     "surface": Range(0.1, 10.0, "1/s"),
     "alpha_start": Range(0.0, 1.0, "m^0.5/s^1.5", log=False),
 }
+FIELD_NOMINAL = usm_gym.Scenario().nominal
 PROBLEM_BUDGET = Budget(trials=20, episodes=3)
 
 
@@ -59,9 +61,32 @@ def test_the_objective_is_the_declared_one() -> None:
     scores["max_error_x"] = np.array([1e-3, 3e-3])
     scores["max_error_y"] = np.array([2e-3, 4e-3])
     scores["thrust_variation"] = np.array([100.0, 300.0])
+    scores["heading_error"] = np.radians([2.0, 4.0])
     evaluation = Evaluation(scores, np.zeros(2, bool))
-    assert objective(evaluation) == pytest.approx(5.0 + 0.002 * 200.0)
-    assert objective(evaluation, weight=0.0) == pytest.approx(5.0)
+    assert objective(evaluation) == pytest.approx(5.0 + 0.002 * 200.0 + 0.05 * 3.0)
+    assert objective(evaluation, weight=0.0) == pytest.approx(5.0 + 0.05 * 3.0)
+
+
+def test_every_fourth_scenario_reacts_later_than_the_policy_is_told() -> None:
+    asked = problem(budget=Budget(20, 8))
+    for purpose in (TUNING, VALIDATION):
+        job = asked.job({}, purpose)
+        assert job.nominal == FIELD_NOMINAL
+        for episode, (told, met) in enumerate(
+            zip(asked.scenarios(purpose), job.scenarios, strict=True)
+        ):
+            late = replace(told.conditions, action_delay=1, thruster_time_constant=0.065)
+            expected = late if episode in (3, 7) else told.conditions
+            assert met == replace(told, conditions=expected)
+
+
+def test_every_search_starts_from_the_middle_of_its_ranges(monkeypatch: Any) -> None:
+    asked, job = [], Problem.job
+    monkeypatch.setattr(
+        Problem, "job", lambda own, gains, purpose: asked.append(gains) or job(own, gains, purpose)
+    )
+    tune(problem(budget=Budget(1, 1)))
+    assert asked[0] == pytest.approx({name: span.middle for name, span in SPACE.items()})
 
 
 def test_tuning_improves_and_gives_up_what_is_no_good() -> None:

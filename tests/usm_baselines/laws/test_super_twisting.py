@@ -174,6 +174,22 @@ def test_alpha_grows_outside_the_dead_zone_only(implicit: bool) -> None:
             assert state[1] == pytest.approx(2.0 + grows * growth, rel=1e-14)
 
 
+@pytest.mark.parametrize("implicit", [True, False])
+def test_alpha_falls_inside_the_dead_zone_as_fast_as_it_grows_in_the_law_of_shtessel(
+    implicit: bool,
+) -> None:
+    law = implicit_law if implicit else explicit_law
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        gains = gains_drawn(rng)._replace(fall=1.0, alpha_start=0.3)
+        change = 0.02 * gains.omega * np.sqrt(gains.gamma / 2.0)
+        for alpha in (0.3, 0.3 + 0.5 * change, 0.3 + 2.0 * change):
+            for share, sign in ((0.999, -1.0), (1.001, 1.0)):
+                state = np.array([0.3, alpha])
+                law(share * gains.dead_zone, 0.02, gains, state)
+                assert state[1] == pytest.approx(max(alpha + sign * change, 0.3), rel=1e-12)
+
+
 @pytest.mark.parametrize(
     "gains",
     [

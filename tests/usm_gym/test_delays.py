@@ -1,0 +1,102 @@
+"""Commands take effect late, and positions are measured late, by whole control periods."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from usm_gym import Conditions, Scenario, suite
+from usm_gym.simulation import Simulation
+
+STEPS = 40
+START = [replace(scenario, settle_time=0.0) for scenario in suite("operation")[:3]]
+
+
+def delayed(scenario: Scenario, **delays: int) -> Scenario:
+    return replace(scenario, conditions=replace(scenario.conditions, **delays))
+
+
+def actions(steps: int = STEPS, robots: int = 3) -> NDArray[np.float32]:
+    rng = np.random.default_rng(0)
+    return rng.uniform(-1.0, 1.0, (steps, robots, 5)).astype(np.float32)
+
+
+def positions(simulation: Simulation, given: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the positions after every step, (steps, robots, 2)."""
+    path = []
+    for action in given:
+        simulation.step(action)
+        path.append(simulation.read("position"))
+    return np.array(path)
+
+
+def test_a_late_command_does_what_it_would_have_done_then() -> None:
+    given, waits = actions(), (0, 1, 4)
+    late = Simulation([delayed(s, action_delay=d) for s, d in zip(START, waits, strict=True)])
+    shifted = np.zeros_like(given)
+    for robot, wait in enumerate(waits):
+        shifted[wait:, robot] = given[: STEPS - wait, robot]
+    np.testing.assert_array_equal(positions(late, given), positions(Simulation(START), shifted))
+
+
+def test_the_command_in_effect_is_observed() -> None:
+    simulation = Simulation([delayed(START[0], action_delay=2)])
+    place = simulation.layout.slices["thruster_command"]
+    given = actions(5, 1)
+    seen = []
+    for action in given:
+        simulation.step(action)
+        seen.append(simulation.observation[0, place].copy())
+    np.testing.assert_array_equal(seen[:2], np.zeros((2, 5)))
+    np.testing.assert_allclose(seen[2:], given[:3, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("robots", [1, 3])
+def test_a_late_position_is_that_of_then_with_the_noise_of_now(robots: int) -> None:
+    lates = (0, 1, 5)[-robots:]
+    scenarios = [delayed(s, position_delay=d) for s, d in zip(START, lates, strict=False)]
+    simulation, scale = Simulation(scenarios), Simulation(START).layout.scale
+    place = simulation.layout.slices["position_error"]
+    errors, noise = [simulation.error.copy()], [s.noise() for s in scenarios]
+    for k, action in enumerate(actions(12, robots), start=1):
+        simulation.step(action)
+        errors.append(simulation.error.copy())
+        for robot, late in enumerate(lates):
+            expected = errors[max(k - late, 0)][robot] + noise[robot][k]
+            seen = simulation.observation[robot, place] * scale[place]
+            np.testing.assert_allclose(seen, expected, rtol=1e-5, atol=1e-9)
+
+
+def test_snapshots_hold_what_is_under_way() -> None:
+    scenarios = [delayed(s, action_delay=3, position_delay=2) for s in START]
+    simulation, given = Simulation(scenarios), actions()
+    positions(simulation, given[:10])
+    taken = simulation.snapshot()
+    after = positions(simulation, given[10:]), simulation.observation.copy()
+    other = Simulation(START)  # which has kept nothing so far
+    for copy in (simulation, other):
+        copy.restore(taken)
+        again = positions(copy, given[10:]), copy.observation
+        np.testing.assert_array_equal(again[0], after[0])
+        np.testing.assert_array_equal(again[1], after[1])
+
+
+def test_a_robot_that_waits_longer_changes_nothing_for_the_others() -> None:
+    scenarios = [delayed(s, action_delay=2, position_delay=2) for s in START]
+    given, alone, joined = actions(), Simulation(scenarios), Simulation(scenarios)
+    for k, action in enumerate(given):
+        if k == 7:
+            joined.start(1, delayed(START[1], action_delay=5, position_delay=9))
+        alone.step(action)
+        joined.step(action)
+        for robot in (0, 2):
+            np.testing.assert_array_equal(joined.observation[robot], alone.observation[robot])
+
+
+@pytest.mark.parametrize("field", ["action_delay", "position_delay"])
+@pytest.mark.parametrize("value", [-1, 101, 0.5, True, "1"])
+def test_delays_are_whole_periods(field: str, value: object) -> None:
+    with pytest.raises(ValueError, match=field):
+        Conditions(**{field: value})
+    assert getattr(Scenario(conditions=Conditions(**{field: 3})).nominal, field) == 3
