@@ -42,6 +42,7 @@ class Contender:
         name: That name.
         factory: Makes the policy from nominal knowledge.
         privileged: Whether it is given true state, and so is no competitor.
+        told: What it is told besides the measured position and the reference; empty if unknown.
         identity: What its scores depend on besides scenarios and nominal knowledge; None where that
             is not known, as for the code of others.
     """
@@ -49,6 +50,7 @@ class Contender:
     name: str
     factory: Callable[[Nominal], Any]
     privileged: bool = False
+    told: str = ""
     identity: str | None = None
 
     @property
@@ -117,7 +119,7 @@ def registered(name: str, entry: Registration) -> Contender:
         sources = fingerprint("usm_gym", "usm_baselines", package)
         where = [factory.__module__, factory.__qualname__]
         identity = json.dumps([where, settings, sources], sort_keys=True)
-    return Contender(name, entry.factory, entry.privileged, identity)
+    return Contender(name, entry.factory, entry.privileged, entry.told, identity)
 
 
 def own(name: str) -> Callable[..., Any]:

@@ -29,6 +29,9 @@ from usm_gym.policy import Policy
 from usm_gym.support.validation import UsageError, require
 from usm_gym.task.nominal import Nominal
 
+# What a policy is told that is told no more than the measured position and the reference.
+POSITION_ONLY = "position only"
+
 
 @dataclass(frozen=True)
 class Registration:
@@ -46,7 +49,7 @@ class Registration:
     factory: Callable[..., Policy]
     summary: str
     space: Space = field(default_factory=dict)
-    told: str = "position only"
+    told: str = POSITION_ONLY
     on_request: bool = False
     privileged: bool = False
 
@@ -60,7 +63,7 @@ def register(
     summary: str,
     *,
     space: Space | None = None,
-    told: str = "position only",
+    told: str = POSITION_ONLY,
     on_request: bool = False,
     privileged: bool = False,
 ) -> None:

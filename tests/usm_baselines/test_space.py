@@ -14,7 +14,6 @@ from usm_baselines.space import Gain, Range, declared, space_of
 
 from usm_gym import suite
 
-
 OBSERVER = "observer_gain"
 
 

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from rich.table import Table
-from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult
+from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, attitude_in
 
 from usm_cli.selection import (
     POLICIES,
@@ -25,7 +25,7 @@ from usm_cli.selection import (
 from usm_cli.terminal import empty_table, output_console
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
-from usm_gym.support.text import figures, mm
+from usm_gym.support.text import degrees, figures, mm
 
 DESCRIPTION = """\
 Score policies. The score of an episode is the largest true position error after settling (5 s), in
@@ -70,6 +70,7 @@ def run(arguments: argparse.Namespace) -> None:
     scenarios = chosen_scenarios(arguments)
     chosen = jobs(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
     scores, refused = by_name(chosen, scored(chosen, arguments))
+    told = {job.contender.name: job.contender.told for job in chosen}
     privileged = {job.contender.name for job in chosen if job.contender.privileged}
     result = EvaluationResult(
         suite=suite_name(arguments),
@@ -79,7 +80,9 @@ def run(arguments: argparse.Namespace) -> None:
         episodes=len(scenarios),
         scenarios=tuple(scenarios),
         results={
-            name: CompetitorScores.of(evaluation.summary(), competitor=name not in privileged)
+            name: CompetitorScores.of(
+                evaluation.summary(), competitor=name not in privileged, told=told[name]
+            )
             for name, evaluation in scores.items()
         },
         refused=refused,
@@ -95,17 +98,19 @@ def run(arguments: argparse.Namespace) -> None:
 def table(result: EvaluationResult) -> Table:
     """The scores for the terminal, errors in mm."""
     axes = result.axes
-    headings = [prefix + axis for prefix in ("", "worst ", "settled ") for axis in axes]
+    headings = [prefix + axis for prefix in ("", "worst ", "rms ") for axis in axes]
+    headings += [f"{angle}\n°" for angle in attitude_in(result.results.values())]
     where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
     rows = empty_table(
         "policy",
-        numbers=(*headings, "thrust\nN", "variation\nN/s", "lost"),
+        numbers=(*headings, "variation\nN/s", "lost"),
         title=f"largest position error after settling, mm: mean [95 % interval] ({where})",
     )
     for name, row in result.results.items():
-        errors, settled = row.errors.values(), row.by_axis("settled_error").values()
+        errors, rms = row.errors.values(), row.by_axis("rms_error").values()
         cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
-        cells += [mm(e.worst) for e in errors] + [mm(e.mean) for e in settled]
-        cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
+        cells += [mm(e.worst) for e in errors] + [mm(e.mean) for e in rms]
+        cells += [degrees(e.mean) for e in row.attitude.values()]
+        cells.append(figures(row.metrics["thrust_variation"].mean))
         rows.add_row(name, *cells, str(row.failures))
     return rows

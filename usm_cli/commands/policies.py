@@ -23,9 +23,10 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Print the table."""
-    table = Table("policy", "what it is", box=None)
+    table = Table("policy", "what it is", "told", box=None)
     for id in ids():
         policy = entry(id)
         marks = [mark for mark in ("on_request", "privileged") if getattr(policy, mark)]
-        table.add_row(id, policy.summary + "".join(f" ({mark})" for mark in marks))
+        said = "".join(f" ({mark.replace('_', ' ')})" for mark in marks)
+        table.add_row(id, policy.summary + said, policy.told)
     output_console().print(table)

@@ -7,13 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from usm_baselines.benchmark.leaderboard import Lead, Standing
 from usm_baselines.benchmark.leaderboard_page import in_short
-from usm_baselines.benchmark.results import CompetitorScores, Scores, Summary, axes_in
+from usm_baselines.benchmark.results import (
+    CompetitorScores,
+    Scores,
+    Summary,
+    attitude_in,
+    axes_in,
+)
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult
 from usm_baselines.paper.reproduction import PARTS, ReproductionResult
 
 from usm_cli.report.blocks import Cell, Column, Mark, SortableTable
 from usm_gym.statistics import interquartile_mean
-from usm_gym.support.text import figures, listed, mm
+from usm_gym.support.text import degrees, figures, listed, mm
 from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.scenario import Scenario
 
@@ -52,6 +58,8 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
         Column(f"{listed(axes)} on one scale, mm" if axes else "error", scale.ticks, axes),
         *(Column(f"middle half {axis}") for axis in axes),
         *(Column(f"worst {axis}") for axis in axes),
+        *(Column(f"rms {axis}") for axis in axes),
+        *(Column(f"{angle}, °") for angle in attitude_in(rows.values())),
         Column("thrust, N"),
         Column("variation, N/s"),
         Column("lost"),
@@ -66,6 +74,8 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
         cells.append(Cell("", row.objective, marks=scale.marks(errors)))
         cells += [length(float(half)) for half in halves]
         cells += [length(error.worst) for error in errors.values()]
+        cells += [length(error.mean) for error in row.by_axis("rms_error").values()]
+        cells += [Cell(degrees(e.mean), e.mean) for e in row.attitude.values()]
         for key in ("thrust_effort", "thrust_variation"):
             mean = row.metrics[key].mean
             cells.append(Cell(figures(mean), mean))

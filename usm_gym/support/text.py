@@ -17,6 +17,11 @@ def mm(metres: float) -> str:
     return figures(1e3 * metres)
 
 
+def degrees(radians: float) -> str:
+    """Write an angle in degrees with three significant figures."""
+    return figures(math.degrees(radians))
+
+
 def listed(words: Sequence[str]) -> str:
     """List words as in a sentence: "x", "x and y", "x, y and z"."""
     *most, last = words

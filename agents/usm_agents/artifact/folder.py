@@ -21,7 +21,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 from usm_baselines.contender import Contender, fingerprint
 from usm_baselines.gains import Gain
-from usm_baselines.registry import make, register
+from usm_baselines.registry import POSITION_ONLY, entry, make, register
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
@@ -35,6 +35,8 @@ NEW_WEIGHTS = "policy.new.safetensors"  # for the moment between writing them an
 RECURRENCE = "recurrence_"  # begins the names of its arrays
 LARGEST_WEIGHTS = 256 * 2**20  # bytes
 PRETRAINED = Path(__file__).with_name("pretrained")
+# What agents are told besides what their base is, by their estimator and their observation.
+TOLD = ("lag", "noise", "straight body", "joint references")
 
 
 @validated
@@ -190,6 +192,12 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     return ResidualPolicy(residual, network)
 
 
+def told_with(base: str) -> str:
+    """What an agent on a base policy is told besides the measured position and the reference."""
+    known = entry(base).told.split(", ")
+    return ", ".join(dict.fromkeys([*TOLD, *(each for each in known if each != POSITION_ONLY)]))
+
+
 def agent_contender(folder: str) -> Contender:
     """The agent of a folder as a contender.
 
@@ -201,12 +209,15 @@ def agent_contender(folder: str) -> Contender:
     sources = fingerprint("usm_gym", "usm_baselines", "usm_agents")
     description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
     identity = json.dumps([agent.weights, description, sources])
-    return Contender(folder, partial(make_agent, folder=folder), identity=identity)
+    return Contender(
+        folder, partial(make_agent, folder=folder), told=told_with(agent.base), identity=identity
+    )
 
 
 def register_shipped() -> None:
     """Register the shipped agents under the names of their folders."""
     for description in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}")):
         folder = description.parent
-        summary = json.loads(description.read_text(encoding="utf-8"))["summary"]
-        register(folder.name, partial(make_agent, folder=str(folder)), summary)
+        said = json.loads(description.read_text(encoding="utf-8"))
+        factory = partial(make_agent, folder=str(folder))
+        register(folder.name, factory, said["summary"], told=told_with(said["base"]))

@@ -22,7 +22,7 @@ from usm_gym.statistics import compare, interquartile_mean, interval
 from usm_gym.suites import NAMES, suite
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
-from usm_gym.task.metrics import MAX_ERROR, axes_of
+from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Scenario
 
@@ -64,10 +64,13 @@ class Standing(CompetitorScores):
 
     Attributes:
         metrics: Summaries by metric, for the largest errors with the middle half.
+        rank: Its place: that of the first row from which the data do not tell it; None if it is
+            no competitor.
         beats_next: Its lead over the next row; None before a row that is no competitor, and last.
     """
 
     metrics: Mapping[str, MiddleSummary | Summary]
+    rank: Count | None = None
     beats_next: Lead | None = None
 
     def __post_init__(self) -> None:
@@ -241,7 +244,7 @@ def leaderboard(
 
 
 def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing]:
-    """The rows of a suite: competitors first, the smaller error first."""
+    """The rows of a suite: competitors first, the smaller objective first."""
 
     def rank(pair: tuple[Contender, Evaluation]) -> tuple[bool, float]:
         return pair[0].privileged, float(pair[1].objective().mean())
@@ -252,13 +255,28 @@ def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing
         for (better, one), (worse, other) in pairwise(order)
         if not worse.privileged
     }
+    places = ranks([scores for contender, scores in order if not contender.privileged])
+    places += [None] * (len(order) - len(places))
     return {
-        contender.name: standing(outcome, contender, leads.get(contender.name))
-        for contender, outcome in order
+        contender.name: standing(outcome, contender, place, leads.get(contender.name))
+        for (contender, outcome), place in zip(order, places, strict=True)
     }
 
 
-def standing(scores: Evaluation, contender: Contender, lead: Lead | None) -> Standing:
+def ranks(order: Sequence[Evaluation]) -> list[int | None]:
+    """The places of rows, best first; those that the data do not tell from the first share it."""
+    places: list[int | None] = []
+    first = 0
+    for index, scores in enumerate(order):
+        if index and compare(order[first].objective(), scores.objective()).decided:
+            first = index
+        places.append(first + 1)
+    return places
+
+
+def standing(
+    scores: Evaluation, contender: Contender, rank: int | None, lead: Lead | None
+) -> Standing:
     """A policy's row: the summary of its scores, interquartile means, and the main episodes."""
     summary = scores.summary()
     errors = [MAX_ERROR + axis for axis in axes_of(scores.per_episode)]
@@ -266,9 +284,11 @@ def standing(scores: Evaluation, contender: Contender, lead: Lead | None) -> Sta
         episodes = scores.per_episode[name]
         summary[name]["iqm"] = float(interquartile_mean(episodes))
         summary[name]["iqm_ci95"] = list(interval(interquartile_mean, episodes))
-    kept = (*errors, "thrust_variation", "failed")
+    attitude = [angle + ANGLE_ERROR for angle in attitude_of(scores.per_episode)]
+    kept = (*errors, *attitude, "thrust_variation", "failed")
     summary["per_episode"] = {name: summary["per_episode"][name] for name in kept}
-    return Standing.of(summary, competitor=not contender.privileged, beats_next=lead)
+    fields = {"competitor": not contender.privileged, "told": contender.told}
+    return Standing.of(summary, **fields, rank=rank, beats_next=lead)
 
 
 def point(scores: Evaluation) -> FrontPoint:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from usm_baselines.benchmark.leaderboard import Lead, LeaderboardResult, Standing
-from usm_baselines.benchmark.results import Summary, axes_in
+from usm_baselines.benchmark.results import Summary, attitude_in, axes_in
 from usm_gym.statistics import FEWEST_EPISODES
-from usm_gym.support.text import figures, listed, mm
+from usm_gym.support.text import degrees, figures, listed, mm
 from usm_gym.support.validation import require
+from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
 MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
 # Whose gains are kept in the README beside better ones: the paper's.
@@ -20,46 +22,68 @@ PAPER = ("sta", "pd")
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes with its 95 % interval, mean of
-the middle half of the episodes, worst episode. Rows are ordered by the sum of the means in {axes}.
-"Beats the next" says whether the interval of the paired difference to the next row leaves out 0,
-and with what probability an episode goes better.
+the middle half of the episodes, worst episode; root mean square, mm; largest heading error, °.
+"Told" is what a policy knows besides the measured position and the reference. Rows are ordered by
+the objective by which gains and agents are chosen: the means in {axes} added up, plus {attitude} mm
+per degree of heading error and {variation} mm per N/s of thrust variation. Rows of one rank are
+those that the data do not tell from the first of them. "Beats the next" says whether the interval
+of the paired difference to the next row leaves out 0, and with what probability an episode goes
+better.
 """
 
 
 def table(rows: Mapping[str, Standing]) -> str:
     """The rows of a suite as Markdown."""
-    axes = axes_in(rows.values())
-    columns = [f"{axis}, mm" for axis in axes]
-    columns += [f"{what} {axis}" for what in ("middle half", "worst") for axis in axes]
-    lines = _head([*columns, "thrust, N", "variation, N/s", "lost", "beats the next"])
+    axes, angles = axes_in(rows.values()), attitude_in(rows.values())
+    columns = ["told", *(f"{axis}, mm" for axis in axes)]
+    columns += [f"{what} {axis}" for what in ("middle half", "worst", "rms") for axis in axes]
+    columns += [f"{angle}, °" for angle in angles]
+    lines = _head([*columns, "objective", "thrust, N", "variation, N/s", "lost", "beats the next"])
+    places = rank_labels(rows)
     for id, row in rows.items():
         errors = row.errors.values()
-        cells = [_mean(error) for error in errors]
+        cells = [row.told, *map(_mean, errors)]
         cells += [mm(error.iqm) for error in row.middle] + [mm(error.worst) for error in errors]
+        cells += [mm(error.mean) for error in row.by_axis("rms_error").values()]
+        cells += [degrees(error.mean) for error in row.attitude.values()]
+        cells.append(figures(row.objective))
         cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
         lead = row.beats_next
         decision = "" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})"
-        lines.append(_line(id, row, [*cells, str(row.failures), decision]))
+        lines.append(_line(places[id], id, row, [*cells, str(row.failures), decision]))
     return "\n".join(lines) + "\n"
 
 
 def brief_table(rows: Mapping[str, Standing]) -> str:
     """The README's table: every law with its better gains, and the paper's, in fewer columns."""
-    axes = axes_in(rows.values())
-    columns = [*(f"{axis}, mm" for axis in axes), f"worst {' / '.join(axes)}"]
+    axes, angles = axes_in(rows.values()), attitude_in(rows.values())
+    columns = ["told", *(f"{axis}, mm" for axis in axes), f"rms {' / '.join(axes)}"]
+    columns += [f"worst {' / '.join(axes)}", *(f"{angle}, °" for angle in angles)]
     lines = _head([*columns, "variation, N/s", "lost"])
-    laws = set()
+    places, laws = rank_labels(rows), set()
     for id, row in rows.items():
         law = id.removesuffix("-tuned")
         if law in laws and id not in PAPER:
             continue
         laws.add(law)
         errors = row.errors.values()
+        rms = " / ".join(mm(error.mean) for error in row.by_axis("rms_error").values())
         worst = " / ".join(mm(error.worst) for error in errors)
+        attitude = [degrees(error.mean) for error in row.attitude.values()]
         variation = figures(row.metrics["thrust_variation"].mean)
-        cells = [*map(_mean, errors), worst, variation, str(row.failures)]
-        lines.append(_line(id, row, cells))
+        cells = [row.told, *map(_mean, errors), rms, worst, *attitude, variation]
+        lines.append(_line(places[id], id, row, [*cells, str(row.failures)]))
     return "\n".join(lines) + "\n"
+
+
+def rank_labels(rows: Mapping[str, Standing]) -> dict[str, str]:
+    """The rows' ranks as text, with "=" where several share one."""
+    shared = Counter(row.rank for row in rows.values())
+
+    def label(rank: int | None) -> str:
+        return "" if rank is None else f"{rank}=" if shared[rank] > 1 else str(rank)
+
+    return {id: label(row.rank) for id, row in rows.items()}
 
 
 def in_short(lead: Lead) -> str:
@@ -71,7 +95,9 @@ def in_short(lead: Lead) -> str:
 
 def markdown(result: LeaderboardResult) -> str:
     """The whole leaderboard as Markdown."""
-    legend = LEGEND.format(axes=listed(result.axes))
+    legend = LEGEND.format(
+        axes=listed(result.axes), attitude=ATTITUDE_WEIGHT, variation=VARIATION_WEIGHT
+    )
     parts = [f"# Leaderboard of usm-gym {result.version}\n", legend]
     for name, rows in result.suites.items():
         episodes = next(iter(rows.values())).episodes
@@ -101,9 +127,9 @@ def with_table(page: str, result: LeaderboardResult) -> str:
 
 
 def csv_text(result: LeaderboardResult) -> str:
-    """One line per policy and suite; errors in m, thrust in N, variation in N/s."""
+    """One line per policy and suite; errors in m and rad, thrust in N, variation in N/s."""
     scores = [name for name in next(iter(result.main.values())).metrics if name not in NO_COLUMN]
-    head = ["suite", "policy", "competitor", "failures"]
+    head = ["suite", "policy", "told", "competitor", "failures"]
     for name in scores:
         head += [name, f"{name}_low", f"{name}_high", f"{name}_worst"]
     out = io.StringIO()
@@ -111,7 +137,7 @@ def csv_text(result: LeaderboardResult) -> str:
     writer.writerow(head)
     for suite, rows in result.suites.items():
         for id, row in rows.items():
-            line: list[object] = [suite, id, row.competitor, row.failures]
+            line: list[object] = [suite, id, row.told, row.competitor, row.failures]
             for name in scores:
                 summary = row.metrics[name]
                 line += [summary.mean, *summary.ci95, summary.worst]
@@ -120,12 +146,14 @@ def csv_text(result: LeaderboardResult) -> str:
 
 
 def _head(columns: Sequence[str]) -> list[str]:
-    return [f"| policy | {' | '.join(columns)} |", "|---|" + "---:|" * len(columns)]
+    told, *numbers = columns
+    head = f"| | policy | {told} | {' | '.join(numbers)} |"
+    return [head, "|---|---|---|" + "---:|" * len(numbers)]
 
 
-def _line(id: str, row: Standing, cells: Sequence[str]) -> str:
+def _line(place: str, id: str, row: Standing, cells: Sequence[str]) -> str:
     name = id if row.competitor else f"{id} (no competitor)"
-    return "| " + " | ".join([name, *cells]) + " |"
+    return "| " + " | ".join([place, name, *cells]) + " |"
 
 
 def _mean(error: Summary) -> str:

@@ -12,7 +12,7 @@ from usm_gym.statistics import Comparison
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.metrics import MAX_ERROR, axes_of, objective
+from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
 from usm_gym.task.stored_scenario import StoredScenarios
 
 Failures = Annotated[int, Field(strict=True, ge=0)]
@@ -64,9 +64,8 @@ class Scores(Part):
     def __post_init__(self) -> None:
         """Refuse scores that lack what tables and pages show."""
         require(self.axes, "metrics", list(self.metrics), f"one {MAX_ERROR}AXIS or more")
-        needed = {
-            f"{metric}_{axis}" for metric in ("max_error", "settled_error") for axis in self.axes
-        }
+        shown = ("max_error", "settled_error", "rms_error")
+        needed = {f"{metric}_{axis}" for metric in shown for axis in self.axes}
         missing = {*needed, "thrust_effort", "thrust_variation"} - set(self.metrics)
         require(not missing, "metrics", list(self.metrics), f"also {', '.join(sorted(missing))}")
         for axis in self.axes:
@@ -100,6 +99,11 @@ class Scores(Part):
         """What policies are ranked by, mm: see `usm_gym.task.metrics.objective`."""
         return float(objective({name: summary.mean for name, summary in self.metrics.items()}))
 
+    @property
+    def attitude(self) -> dict[str, Summary]:
+        """The largest error of the attitude after settling, rad, by angle."""
+        return {name: self.metrics[name + ANGLE_ERROR] for name in attitude_of(self.metrics)}
+
     def by_axis(self, metric: str) -> dict[str, Summary]:
         """The summary of a metric such as "settled_error", by axis."""
         return {axis: self.metrics[f"{metric}_{axis}"] for axis in self.axes}
@@ -111,9 +115,11 @@ class CompetitorScores(Scores):
 
     Attributes:
         competitor: False if it is told more than a vehicle knows.
+        told: What it is told besides the measured position and the reference; empty if unknown.
     """
 
     competitor: Switch
+    told: str = ""
 
 
 def require_alike(rows: Iterable[Scores]) -> None:
@@ -127,6 +133,11 @@ def require_alike(rows: Iterable[Scores]) -> None:
     require(len(axes) <= 1, "axes", axes, "the same for every policy")
     episodes = sorted({row.episodes for row in listed})
     require(len(episodes) <= 1, "episodes", episodes, "as many for every policy")
+
+
+def attitude_in(rows: Iterable[Scores]) -> tuple[str, ...]:
+    """The angles that rows have in common; none if there is no row."""
+    return next((tuple(row.attitude) for row in rows), ())
 
 
 def axes_in(rows: Iterable[Scores]) -> tuple[str, ...]:

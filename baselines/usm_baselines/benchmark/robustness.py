@@ -77,9 +77,7 @@ def model(scenario: Scenario, spread: float) -> Scenario:
 def delay(scenario: Scenario, periods: float) -> Scenario:
     """Lets commands take effect later."""
     require(periods == int(periods), "delay", periods, "a whole number of control periods")
-    return replace(
-        scenario, conditions=replace(scenario.conditions, action_delay=int(periods))
-    )
+    return replace(scenario, conditions=replace(scenario.conditions, action_delay=int(periods)))
 
 
 def rate(scenario: Scenario, frequency: float) -> Scenario:
@@ -101,9 +99,7 @@ QUANTITIES = {
         (0.0, 0.02, 0.05, 0.1, 0.2),
         condition("thruster_time_constant"),
     ),
-    "delay": Quantity(
-        "delay of the commands [control periods]", (0.0, 1.0, 2.0, 3.0, 5.0), delay
-    ),
+    "delay": Quantity("delay of the commands [control periods]", (0.0, 1.0, 2.0, 3.0, 5.0), delay),
     "limit": Quantity(
         "thruster limit [N]", (2.5, 5.0, 10.0, 20.0, 40.0), condition("thruster_limit")
     ),
