@@ -29,7 +29,7 @@ class JointLQGGains(NamedTuple):
         1e-2,
         "m/s^2 / sqrt(Hz)",
         "spectral density of the noise on the acceleration",
-        tuned=(1e-5, 1.0),
+        tuned=(1e-6, 1.0),
         positive=True,
     )
     # The nominal plant leaves less to the disturbance than the straight body of `lqg`.

@@ -31,7 +31,7 @@ class LQGGains(NamedTuple):
         1e-2,
         "m/s^2 / sqrt(Hz)",
         "spectral density of the noise on the acceleration",
-        tuned=(1e-5, 1.0),
+        tuned=(1e-6, 1.0),
         positive=True,
     )
     disturbance_noise: float = Gain(
