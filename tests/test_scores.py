@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 from support.scores import EPISODES, POLICIES, first_second, recorded, scores
 
-LEADERBOARD = Path(__file__).parents[1] / "results" / "0.1.0" / "leaderboard.json"
+import usm_gym
+
+RESULTS = Path(__file__).parents[1] / "results"
+LEADERBOARD = RESULTS / usm_gym.__version__ / "leaderboard.json"
 # LAPACK designs the gains of these, and its last bits differ between machines. Gains that are off
 # by 1e-8 of themselves move a score by 1e-7 of itself. Everything else is the same on any machine:
 # kernels and the networks of agents fix the order of their operations.
