@@ -47,7 +47,7 @@ def test_the_scripted_policies_are_there() -> None:
 def test_the_gains_of_a_space_are_gains_and_their_ranges_work(id: str) -> None:
     nominal = gym.make("USM-Operation-v0").unwrapped.nominal
     space = registry.entry(id).space
-    assert len(space) <= 7
+    assert len(space) <= 8
     assert bool(space) == (id not in ("sta-explicit", "zero"))
     for end in ("low", "high"):
         gains = {name: getattr(each, end) for name, each in space.items()}
@@ -94,6 +94,8 @@ def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
         "control_period",
         "thruster_time_constant",
         "position_noise",
+        "position_delay",
+        "action_delay",
     }
     assert nominal.robot == env.unwrapped.robot
     assert nominal.control_period == 0.02

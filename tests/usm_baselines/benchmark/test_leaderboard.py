@@ -87,10 +87,29 @@ def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper
         ]
     )
     lines = leaderboard_page.brief_table(rows).splitlines()[2:]
-    assert [line.split(" | ")[0] for line in lines] == [
-        f"| {id}" for id in ("lqg", "sta-tuned", "pid-tuned", "sta")
-    ]
-    assert lines[1].endswith("| 2000 / 2000 | 2.00 | 0 |")
+    assert [line.split(" | ")[1] for line in lines] == ["lqg", "sta-tuned", "pid-tuned", "sta"]
+    assert lines[1].endswith(
+        "| position only | 2000 [2000, 2000] | 2000 [2000, 2000] "
+        "| 2000 / 2000 | 2000 / 2000 | 115 | 2.00 | 0 |"
+    )
+
+
+def test_rows_that_the_data_do_not_tell_from_the_first_share_its_rank() -> None:
+    rng = np.random.default_rng(0)
+
+    def scores(error: float, noise: float) -> Evaluation:
+        episodes = error + noise * rng.standard_normal(50)
+        return Evaluation({name: episodes for name in METRICS}, np.zeros(50, bool))
+
+    ids = ("lqg", "pid", "ladrc", "smc", "gsta")
+    errors = (1.0, 2.0, 2.001, 2.002, 3.0)
+    pairs = [(contender(id), scores(e, 0.05)) for id, e in zip(ids, errors, strict=True)]
+    seer = replace(contender("zero"), name="seer", privileged=True)
+    rows = board.ranked([*pairs, (seer, scores(0.5, 0.0))])
+    assert {id: rows[id].rank for id in ids} == dict(zip(ids, (1, 2, 2, 2, 5), strict=True))
+    assert rows["seer"].rank is None
+    labels = leaderboard_page.rank_labels(rows)
+    assert [labels[id] for id in (*ids, "seer")] == ["1", "2=", "2=", "2=", "5", ""]
 
 
 def test_readme_and_results_show_the_tables_of_the_leaderboard() -> None:
