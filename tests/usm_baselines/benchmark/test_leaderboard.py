@@ -99,7 +99,7 @@ def test_rows_that_the_data_do_not_tell_from_the_first_share_its_rank() -> None:
 
     def scores(error: float, noise: float) -> Evaluation:
         episodes = error + noise * rng.standard_normal(50)
-        return Evaluation({name: episodes for name in METRICS}, np.zeros(50, bool))
+        return Evaluation(dict.fromkeys(METRICS, episodes), np.zeros(50, bool))
 
     ids = ("lqg", "pid", "ladrc", "smc", "gsta")
     errors = (1.0, 2.0, 2.001, 2.002, 3.0)
