@@ -46,7 +46,7 @@ from usm_gym.task.scenario import Mode, Scenario
 ROUND = 8
 # In every so many-th scenario commands take effect a period late and thrusters lag more, by a
 # factor; the policy is not told.
-MARGIN_EVERY, MARGIN_DELAY, MARGIN_LAG = 4, 1, 1.3
+MARGIN_EVERY, MARGIN_DELAY, MARGIN_LAG = 8, 1, 1.3
 # Objective of a trial that has no score, mm.
 FAILED = 1e4
 # Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.

@@ -67,8 +67,8 @@ def test_the_objective_is_the_declared_one() -> None:
     assert objective(evaluation, weight=0.0) == pytest.approx(5.0 + 0.05 * 3.0)
 
 
-def test_every_fourth_scenario_reacts_later_than_the_policy_is_told() -> None:
-    asked = problem(budget=Budget(20, 8))
+def test_every_eighth_scenario_reacts_later_than_the_policy_is_told() -> None:
+    asked = problem(budget=Budget(20, 16))
     for purpose in (TUNING, VALIDATION):
         job = asked.job({}, purpose)
         assert job.nominal == FIELD_NOMINAL
@@ -76,7 +76,7 @@ def test_every_fourth_scenario_reacts_later_than_the_policy_is_told() -> None:
             zip(asked.scenarios(purpose), job.scenarios, strict=True)
         ):
             late = replace(told.conditions, action_delay=1, thruster_time_constant=0.065)
-            expected = late if episode in (3, 7) else told.conditions
+            expected = late if episode in (7, 15) else told.conditions
             assert met == replace(told, conditions=expected)
 
 
