@@ -53,9 +53,10 @@ class USMEnv(TrackingEnv):
 
     ## Reward
 
-    r = -10 mean_axes |e| / (|e| + 0.02 m) - 0.1 mean_thrusters |command| / limit, with the true
-    position error e after the step. The step that loses the robot costs -10.1 for itself and for
-    every step that remains, so that ending early never pays.
+    r = -10 mean_axes |e| / (|e| + 0.02 m) - 0.25 |a| / (|a| + 20 deg)
+    - 0.1 mean_thrusters |command| / limit, with the true position error e and the heading error a
+    after the step. The step that loses the robot costs -10.35 for itself and for every step that
+    remains, so that ending early never pays.
 
     ## Start
 
@@ -92,7 +93,8 @@ window shows every step in real time (drawing needs the extra `render`) |
 
     ## Version history
 
-    - v0: first version.
+    - v0: first version; since 0.2.0 the heading is part of the reward, and the physics step of
+      second order.
     """
 
     # One frame per control period; an instance corrects the rate if it has another period.

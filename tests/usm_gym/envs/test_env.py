@@ -172,8 +172,8 @@ def test_a_lost_robot_ends_the_episode_with_a_finite_observation_and_the_bill():
     assert info["diverged"] == 1
     assert max(abs(info["error_x"]), abs(info["error_y"])) > 0.5
     assert env.observation_space.contains(observation)
-    # Lost in step k, it is charged 10.1 for that step and for each of the 2000 - k that remain.
-    assert rewards[-1] == pytest.approx(-10.1 * (1 + 2000 - len(rewards)))
+    # Lost in step k, it is charged 10.35 for that step and for each of the 2000 - k that remain.
+    assert rewards[-1] == pytest.approx(-10.35 * (1 + 2000 - len(rewards)))
 
 
 def test_an_episode_that_is_over_waits_for_reset():
