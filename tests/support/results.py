@@ -24,8 +24,10 @@ def scores(axes: Sequence[str], size: float, episodes: int) -> CompetitorScores:
     errors = {axis: size * (k + 1) for k, axis in enumerate(axes)}
     metrics = {f"max_error_{axis}": summary(error) for axis, error in errors.items()}
     metrics |= {f"settled_error_{axis}": summary(0.5 * error) for axis, error in errors.items()}
+    metrics |= {f"rms_error_{axis}": summary(0.3 * error) for axis, error in errors.items()}
     metrics |= {name: summary(3.0) for name in ("thrust_effort", "thrust_variation")}
     per_episode = {f"max_error_{axis}": (error,) * episodes for axis, error in errors.items()}
+    per_episode["thrust_variation"] = (3.0,) * episodes
     return CompetitorScores(metrics=metrics, failures=0, per_episode=per_episode, competitor=True)
 
 

@@ -26,8 +26,8 @@ def test_an_evaluation(axes, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     result = evaluation(axes, ("pd", "sta"), SCENARIOS)
     headings = [column.header for column in evaluate.table(result).columns]
-    places = [f"{what}{axis}" for what in ("", "worst ", "settled ") for axis in axes]
-    assert headings == ["policy", *places, "thrust\nN", "variation\nN/s", "lost"]
+    places = [f"{what}{axis}" for what in ("", "worst ", "rms ") for axis in axes]
+    assert headings == ["policy", *places, "variation\nN/s", "lost"]
     result.write("result.json")
     main(["report", "result.json", "--output", "page.html"])
     text = (tmp_path / "page.html").read_text()
@@ -40,9 +40,9 @@ def test_an_evaluation(axes, tmp_path, monkeypatch, capsys):
     capsys.readouterr()
     main(["compare", "result.json:pd", "result.json:sta", "--output", "compared.json"])
     said = capsys.readouterr().out.splitlines()
-    assert [line.partition(":")[0] for line in said] == list(axes)
+    assert [line.partition(":")[0] for line in said] == [*axes, "objective"]
     compared = json.loads((tmp_path / "compared.json").read_text())["comparisons"]
-    assert list(compared) == [f"max_error_{axis}" for axis in axes]
+    assert list(compared) == [*(f"max_error_{axis}" for axis in axes), "objective"]
 
 
 @axes
@@ -70,8 +70,9 @@ def test_a_leaderboard(axes, tmp_path):
         refused={},
         provenance=PROVENANCE,
     )
-    assert "the sum of the means in a" in markdown(result)
-    assert f"| {' | '.join(f'{axis}, mm' for axis in axes)} | middle half a |" in markdown(result)
+    assert f"the means in {'a, b and c' if len(axes) == 3 else 'a'} added up" in markdown(result)
+    columns = " | ".join(f"{axis}, mm" for axis in axes)
+    assert f"| | policy | told | {columns} | middle half a |" in markdown(result)
     assert f"worst {' / '.join(axes)} |" in brief_table(result.main)
     head, *lines = csv_text(result).splitlines()
     assert [name for name in head.split(",") if name.startswith("max_error") and name[-2] == "_"]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from usm_agents.policies import named
 from usm_baselines.benchmark.results import ComparisonResult, Difference, EvaluationResult
 
@@ -25,16 +26,17 @@ from usm_cli.terminal import output_console
 from usm_gym.statistics import compare
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
-from usm_gym.support.text import mm
+from usm_gym.support.text import degrees, figures, mm
 from usm_gym.support.validation import require
-from usm_gym.task.metrics import MAX_ERROR, axes_of
+from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
 from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import OtherScenario
 
 DESCRIPTION = """\
 Compare two policies episode by episode, on the same scenarios and noise. Prints the mean
-difference of the largest position errors (B - A) with its 95 % bootstrap interval, the probability
-that B does better in an episode, and whether the data decide. A and B are policies or results from
+difference (B - A) of the largest position and heading errors, and of the objective that tables are
+ordered by, with its 95 % bootstrap interval, the probability that B does better in an episode, and
+whether the data decide. A and B are policies or results from
 `usm evaluate --output`: FILE.json, or FILE.json:POLICY if the file has several policies.
 """
 EXAMPLES = f"""\
@@ -45,7 +47,9 @@ examples:
   usm compare results.json:sta results.json:pd      evaluates nothing
   usm compare results.json:sta my_module:Mine       evaluates Mine on the scenarios of the file
 """
-Scores = Mapping[str, Sequence[float]]
+Scores = Mapping[str, Any]
+# The name of the objective among the metrics that are compared.
+OBJECTIVE = "objective"
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class PolicyScores:
 
     Attributes:
         scenarios: The file's scenarios.
-        scores: The largest errors of the episodes, by metric.
+        scores: What is compared of the episodes, by metric: see `metrics_of`.
     """
 
     scenarios: list[Scenario | OtherScenario]
@@ -94,7 +98,7 @@ def run(arguments: argparse.Namespace) -> None:
     scores = {name: part.scores for name, part in files.items()}
     evaluated, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
-    scores |= {name: errors_of(evaluation.per_episode) for name, evaluation in evaluated.items()}
+    scores |= {name: metrics_of(evaluation.per_episode) for name, evaluation in evaluated.items()}
     first, second = (scores[name] for name in names)
     require(list(first) == list(second), "B", names[1], "a policy on the axes of A")
     compared = {name: compare(first[name], second[name]) for name in first}
@@ -106,9 +110,8 @@ def run(arguments: argparse.Namespace) -> None:
         provenance=Provenance.here({"files": list(files)} if files else seeds(arguments)),
     )
     console = output_console()
-    for axis, name in zip(axes_of(compared), compared, strict=True):
-        said = sentence(axis, result.comparisons[name], *names)
-        console.print(said, markup=False, soft_wrap=True)
+    for name, difference in result.comparisons.items():
+        console.print(sentence(name, difference, *names), markup=False, soft_wrap=True)
     if arguments.output:
         result.write(arguments.output)
 
@@ -139,21 +142,32 @@ def read_results(name: str) -> PolicyScores:
         policy in result.results if policy else len(result.results) == 1, "results", name, several
     )
     scores = result.results[policy or next(iter(result.results))]
-    return PolicyScores(list(result.scenarios), errors_of(scores.per_episode))
+    return PolicyScores(list(result.scenarios), metrics_of(scores.per_episode))
 
 
-def errors_of(per_episode: Mapping[str, Any]) -> Scores:
-    """The largest errors of the episodes, by metric."""
-    return {MAX_ERROR + axis: per_episode[MAX_ERROR + axis] for axis in axes_of(per_episode)}
+def metrics_of(per_episode: Mapping[str, Any]) -> Scores:
+    """What is compared, by metric: the largest errors and those of the attitude, and the objective.
+
+    The objective is in mm, errors are in m and rad.
+    """
+    names = [MAX_ERROR + axis for axis in axes_of(per_episode)]
+    names += [angle + ANGLE_ERROR for angle in attitude_of(per_episode)]
+    arrays = {name: np.asarray(values, float) for name, values in per_episode.items()}
+    return {**{name: arrays[name] for name in names}, OBJECTIVE: objective(arrays)}
 
 
-def sentence(axis: str, difference: Difference, first: str, second: str) -> str:
+def sentence(metric: str, difference: Difference, first: str, second: str) -> str:
     """Describe a difference in one sentence."""
+    label, unit = metric.removeprefix(MAX_ERROR), "mm"
+    written: Callable[[float], str] = figures if metric == OBJECTIVE else mm
+    if metric.endswith(ANGLE_ERROR):
+        label, unit, written = metric.removesuffix(ANGLE_ERROR), "°", degrees
     low, high = difference.difference_ci95
     least, most = difference.improvement_ci95
     return (
-        f"{axis}: {first} {mm(difference.first)} mm, {second} {mm(difference.second)} mm, "
-        f"difference {mm(difference.difference)} [{mm(low)}, {mm(high)}] mm over "
+        f"{label}: {first} {written(difference.first)} {unit}, "
+        f"{second} {written(difference.second)} {unit}, difference "
+        f"{written(difference.difference)} [{written(low)}, {written(high)}] {unit} over "
         f"{difference.episodes} episodes; {second} does better with probability "
         f"{difference.improvement:.2f} [{least:.2f}, {most:.2f}]: "
         f"{difference.verdict}."

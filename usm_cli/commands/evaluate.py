@@ -6,7 +6,12 @@ import argparse
 from typing import Any
 
 from rich.table import Table
-from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, attitude_in
+from usm_baselines.benchmark.results import (
+    CompetitorScores,
+    EvaluationResult,
+    attitude_in,
+    rms_in,
+)
 
 from usm_cli.selection import (
     POLICIES,
@@ -98,7 +103,8 @@ def run(arguments: argparse.Namespace) -> None:
 def table(result: EvaluationResult) -> Table:
     """The scores for the terminal, errors in mm."""
     axes = result.axes
-    headings = [prefix + axis for prefix in ("", "worst ", "rms ") for axis in axes]
+    headings = [prefix + axis for prefix in ("", "worst ") for axis in axes]
+    headings += [f"rms {axis}" for axis in rms_in(result.results.values())]
     headings += [f"{angle}\n°" for angle in attitude_in(result.results.values())]
     where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
     rows = empty_table(
@@ -107,7 +113,7 @@ def table(result: EvaluationResult) -> Table:
         title=f"largest position error after settling, mm: mean [95 % interval] ({where})",
     )
     for name, row in result.results.items():
-        errors, rms = row.errors.values(), row.by_axis("rms_error").values()
+        errors, rms = row.errors.values(), row.rms.values()
         cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
         cells += [mm(e.worst) for e in errors] + [mm(e.mean) for e in rms]
         cells += [degrees(e.mean) for e in row.attitude.values()]

@@ -13,6 +13,7 @@ from usm_baselines.benchmark.results import (
     Summary,
     attitude_in,
     axes_in,
+    rms_in,
 )
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult
 from usm_baselines.paper.reproduction import PARTS, ReproductionResult
@@ -58,7 +59,7 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
         Column(f"{listed(axes)} on one scale, mm" if axes else "error", scale.ticks, axes),
         *(Column(f"middle half {axis}") for axis in axes),
         *(Column(f"worst {axis}") for axis in axes),
-        *(Column(f"rms {axis}") for axis in axes),
+        *(Column(f"rms {axis}") for axis in rms_in(rows.values())),
         *(Column(f"{angle}, °") for angle in attitude_in(rows.values())),
         Column("thrust, N"),
         Column("variation, N/s"),
@@ -74,7 +75,7 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
         cells.append(Cell("", row.objective, marks=scale.marks(errors)))
         cells += [length(float(half)) for half in halves]
         cells += [length(error.worst) for error in errors.values()]
-        cells += [length(error.mean) for error in row.by_axis("rms_error").values()]
+        cells += [length(error.mean) for error in row.rms.values()]
         cells += [Cell(degrees(e.mean), e.mean) for e in row.attitude.values()]
         for key in ("thrust_effort", "thrust_variation"):
             mean = row.metrics[key].mean

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from usm_baselines.benchmark.leaderboard import Lead, LeaderboardResult, Standing
-from usm_baselines.benchmark.results import Summary, attitude_in, axes_in
+from usm_baselines.benchmark.results import Summary, attitude_in, axes_in, rms_in
 from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.support.text import degrees, figures, listed, mm
 from usm_gym.support.validation import require
@@ -36,7 +36,8 @@ def table(rows: Mapping[str, Standing]) -> str:
     """The rows of a suite as Markdown."""
     axes, angles = axes_in(rows.values()), attitude_in(rows.values())
     columns = ["told", *(f"{axis}, mm" for axis in axes)]
-    columns += [f"{what} {axis}" for what in ("middle half", "worst", "rms") for axis in axes]
+    columns += [f"{what} {axis}" for what in ("middle half", "worst") for axis in axes]
+    columns += [f"rms {axis}" for axis in rms_in(rows.values())]
     columns += [f"{angle}, °" for angle in angles]
     lines = _head([*columns, "objective", "thrust, N", "variation, N/s", "lost", "beats the next"])
     places = rank_labels(rows)
@@ -44,7 +45,7 @@ def table(rows: Mapping[str, Standing]) -> str:
         errors = row.errors.values()
         cells = [row.told, *map(_mean, errors)]
         cells += [mm(error.iqm) for error in row.middle] + [mm(error.worst) for error in errors]
-        cells += [mm(error.mean) for error in row.by_axis("rms_error").values()]
+        cells += [mm(error.mean) for error in row.rms.values()]
         cells += [degrees(error.mean) for error in row.attitude.values()]
         cells.append(figures(row.objective))
         cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
@@ -57,7 +58,8 @@ def table(rows: Mapping[str, Standing]) -> str:
 def brief_table(rows: Mapping[str, Standing]) -> str:
     """The README's table: every law with its better gains, and the paper's, in fewer columns."""
     axes, angles = axes_in(rows.values()), attitude_in(rows.values())
-    columns = ["told", *(f"{axis}, mm" for axis in axes), f"rms {' / '.join(axes)}"]
+    rms_axes = " / ".join(rms_in(rows.values()))
+    columns = ["told", *(f"{axis}, mm" for axis in axes), f"rms {rms_axes}"]
     columns += [f"worst {' / '.join(axes)}", *(f"{angle}, °" for angle in angles)]
     lines = _head([*columns, "variation, N/s", "lost"])
     places, laws = rank_labels(rows), set()
@@ -67,7 +69,7 @@ def brief_table(rows: Mapping[str, Standing]) -> str:
             continue
         laws.add(law)
         errors = row.errors.values()
-        rms = " / ".join(mm(error.mean) for error in row.by_axis("rms_error").values())
+        rms = " / ".join(mm(error.mean) for error in row.rms.values())
         worst = " / ".join(mm(error.worst) for error in errors)
         attitude = [degrees(error.mean) for error in row.attitude.values()]
         variation = figures(row.metrics["thrust_variation"].mean)

@@ -64,13 +64,14 @@ class Scores(Part):
     def __post_init__(self) -> None:
         """Refuse scores that lack what tables and pages show."""
         require(self.axes, "metrics", list(self.metrics), f"one {MAX_ERROR}AXIS or more")
-        shown = ("max_error", "settled_error", "rms_error")
-        needed = {f"{metric}_{axis}" for metric in shown for axis in self.axes}
+        needed = {
+            f"{metric}_{axis}" for metric in ("max_error", "settled_error") for axis in self.axes
+        }
         missing = {*needed, "thrust_effort", "thrust_variation"} - set(self.metrics)
         require(not missing, "metrics", list(self.metrics), f"also {', '.join(sorted(missing))}")
-        for axis in self.axes:
+        for name in (*(MAX_ERROR + axis for axis in self.axes), "thrust_variation"):
             kept = list(self.per_episode)
-            require(MAX_ERROR + axis in kept, "per_episode", kept, f"also {MAX_ERROR}{axis}")
+            require(name in kept, "per_episode", kept, f"also {name}")
         counts = sorted({len(values) for values in self.per_episode.values()})
         require(len(counts) == 1 and counts[0] > 0, "episodes", counts, "the same for all metrics")
 
@@ -98,6 +99,12 @@ class Scores(Part):
     def objective(self) -> float:
         """What policies are ranked by, mm: see `usm_gym.task.metrics.objective`."""
         return float(objective({name: summary.mean for name, summary in self.metrics.items()}))
+
+    @property
+    def rms(self) -> dict[str, Summary]:
+        """The root mean square error after settling, m, by axis, as far as it is kept."""
+        known = {axis: self.metrics.get(f"rms_error_{axis}") for axis in self.axes}
+        return {axis: error for axis, error in known.items() if error is not None}
 
     @property
     def attitude(self) -> dict[str, Summary]:
@@ -138,6 +145,11 @@ def require_alike(rows: Iterable[Scores]) -> None:
 def attitude_in(rows: Iterable[Scores]) -> tuple[str, ...]:
     """The angles that rows have in common; none if there is no row."""
     return next((tuple(row.attitude) for row in rows), ())
+
+
+def rms_in(rows: Iterable[Scores]) -> tuple[str, ...]:
+    """The axes of which rows have the root mean square error; none if there is no row."""
+    return next((tuple(row.rms) for row in rows), ())
 
 
 def axes_in(rows: Iterable[Scores]) -> tuple[str, ...]:
