@@ -24,7 +24,7 @@ leaderboard`, `usm robustness`, `usm reproduce` and `usm study`. Needs the extra
 EXAMPLES = f"""\
 {POLICIES}
 examples:
-  usm report results/0.1.0/leaderboard.json --output page.html
+  usm report results/0.2.0/leaderboard.json --output page.html
   usm report mine.json results/robustness/noise.json --output page.html
   usm report mine.json --scenario 7 --policies sta,my_module:MyController --output page.html
 """

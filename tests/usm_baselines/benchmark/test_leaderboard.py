@@ -79,7 +79,7 @@ def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
 
 
 def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper() -> None:
-    order = ("lqg", "lqg-tuned", "sta-tuned", "pid-tuned", "sta", "pid")
+    order = ("lqg", "lqg-tuned", "sta-lag", "sta-tuned", "pid-tuned", "sta", "pid")
     rows = board.ranked(
         [
             (contender(id), Evaluation({n: np.full(50, k) for n in METRICS}, np.zeros(50, bool)))
@@ -87,9 +87,9 @@ def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper
         ]
     )
     lines = leaderboard_page.brief_table(rows).splitlines()[2:]
-    assert [line.split(" | ")[1] for line in lines] == ["lqg", "sta-tuned", "pid-tuned", "sta"]
+    assert [line.split(" | ")[1] for line in lines] == ["lqg", "sta-lag", "pid-tuned", "sta"]
     assert lines[1].endswith(
-        "| position only | 2000 [2000, 2000] | 2000 [2000, 2000] "
+        "| lag | 2000 [2000, 2000] | 2000 [2000, 2000] "
         "| 2000 / 2000 | 2000 / 2000 | 115 | 2.00 | 0 |"
     )
 
