@@ -40,6 +40,7 @@ class Registration:
         space: The gains that are tuned, by name, and where.
         slow: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
+        note: What to bear in mind about its scores; empty if nothing.
     """
 
     factory: Callable[..., Policy]
@@ -47,6 +48,7 @@ class Registration:
     space: Space = field(default_factory=dict)
     slow: bool = False
     privileged: bool = False
+    note: str = ""
 
 
 _entries: dict[str, Registration] = {}
@@ -60,6 +62,7 @@ def register(
     space: Space | None = None,
     slow: bool = False,
     privileged: bool = False,
+    note: str = "",
 ) -> None:
     """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
 
@@ -72,13 +75,14 @@ def register(
             `ScriptedPolicy` declare, and none of another factory.
         slow: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state.
+        note: What to bear in mind about its scores.
 
     Raises:
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    _entries[id] = Registration(factory, summary, chosen, slow, privileged)
+    _entries[id] = Registration(factory, summary, chosen, slow, privileged, note)
     shipped = TUNED / f"{id}.json"
     if shipped.is_file():
         _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
@@ -122,6 +126,7 @@ def tuned(file: GainsFile) -> Registration:
         f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
         slow=base.slow,
         privileged=base.privileged,
+        note=base.note,
     )
 
 

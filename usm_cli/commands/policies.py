@@ -27,5 +27,6 @@ def run(arguments: argparse.Namespace) -> None:
     for id in ids():
         policy = entry(id)
         marks = [mark for mark in ("slow", "privileged") if getattr(policy, mark)]
+        marks += [policy.note] if policy.note else []
         table.add_row(id, policy.summary + "".join(f" ({mark})" for mark in marks))
     output_console().print(table)

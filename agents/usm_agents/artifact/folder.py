@@ -26,6 +26,7 @@ from usm_baselines.registry import make, register
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
+from usm_gym.support.provenance import older_plant
 from usm_gym.support.validation import UsageError, explaining, in_one_line, require, validated
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
@@ -208,5 +209,12 @@ def register_shipped() -> None:
     """Register the shipped agents under the names of their folders."""
     for description in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}")):
         folder = description.parent
-        summary = json.loads(description.read_text(encoding="utf-8"))["summary"]
-        register(folder.name, partial(make_agent, folder=str(folder)), summary)
+        agent = json.loads(description.read_text(encoding="utf-8"))
+        factory = partial(make_agent, folder=str(folder))
+        register(folder.name, factory, agent["summary"], note=_note(agent["training"]))
+
+
+def _note(training: Mapping[str, Any]) -> str:
+    """What to bear in mind about an agent of such a training."""
+    version = training["provenance"]["version"]
+    return f"trained on the plant of {version}" if older_plant(version) else ""
