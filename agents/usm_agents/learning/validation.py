@@ -19,6 +19,7 @@ from usm_agents.residual.task import Residual, ResidualPolicy
 from usm_gym.evaluation import evaluate
 from usm_gym.suites import unseen
 from usm_gym.support.seeding import VALIDATION, stream
+from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
@@ -71,7 +72,7 @@ def best_of(curve: Sequence[Validation]) -> Validation:
 
 def in_words(validation: Validation) -> str:
     """A validation as a progress bar shows it."""
-    errors = (f"{1e3 * validation[MAX_ERROR + axis]:.2f}" for axis in axes_of(validation))
+    errors = (mm(validation[MAX_ERROR + axis]) for axis in axes_of(validation))
     angles = (
         f", {np.degrees(validation[angle + ANGLE_ERROR]):.1f}°" for angle in attitude_of(validation)
     )
