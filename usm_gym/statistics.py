@@ -1,14 +1,20 @@
 """Statistics of episodes: means, quartiles and paired comparisons with bootstrap intervals.
 
 The methods are those that Agarwal et al., "Deep reinforcement learning at the edge of the
-statistical precipice" (NeurIPS 2021), recommend, on the bootstrap of scipy: stratified (every
-stratum is resampled by itself), percentile intervals of 95 %, without randomness. Policies meet
-the same scenarios and noise, so that comparisons are paired: episodes are resampled, not policies.
+statistical precipice" (NeurIPS 2021), recommend: percentile intervals of 95 %, without randomness.
+Policies meet the same scenarios and noise, so that comparisons are paired: episodes are resampled,
+not policies.
+
+Seeds of a training all meet the same scenarios, so their scores are a crossed table, and no two of
+them are independent. There, seeds and scenarios are drawn each for themselves and then crossed, the
+two-way bootstrap of Owen, "The pigeonhole bootstrap" (Annals of Applied Statistics, 2007). With one
+seed it is the ordinary bootstrap of the episodes and says nothing about another training. Few seeds
+vary less than all there could be: an interval of five covers some 87 % where seeds dominate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.support.validation import require
 
 RESAMPLES = 10_000
+# Into so many parts they are cut, to bound the memory.
+PARTS = 20
 # Single episodes are chaotic: from fewer no conclusion is drawn.
 FEWEST_EPISODES = 50
 
@@ -25,33 +33,17 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 
-def interval(
-    statistic: Callable[..., Any], values: ArrayLike, strata: Sequence[str] | None = None
-) -> Interval:
+def interval(statistic: Callable[..., Any], values: ArrayLike) -> Interval:
     """95 % percentile bootstrap interval of a statistic, always the same for the same values.
 
     Args:
         statistic: A function of an array and an `axis`, for instance `np.mean`.
-        values: One value per episode, (episodes,).
-        strata: To which stratum each episode belongs; without it, all are one.
+        values: One value per episode, (episodes,), or per seed and episode, (seeds, episodes).
     """
-    from scipy.stats import bootstrap  # here, because its import takes longer than a first step
-
-    sample = np.asarray(values, np.float64)
-    if sample.size < 2:
-        value = float(statistic(sample, axis=-1))
-        return value, value
-    labels = np.zeros(sample.size) if strata is None else np.asarray(strata)
-    parts = [sample[labels == label] for label in dict.fromkeys(labels.tolist())]
-    limits = bootstrap(
-        parts,
-        lambda *drawn, axis: statistic(np.concatenate(drawn, axis=axis), axis=axis),
-        n_resamples=RESAMPLES,
-        method="percentile",
-        vectorized=True,
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return float(limits.low), float(limits.high)
+    table = np.atleast_2d(np.asarray(values, np.float64))
+    return _interval(
+        lambda seeds, episodes: statistic(_crossed(table, seeds, episodes), axis=-1), *table.shape
+    )
 
 
 def mean_interval(values: Array) -> tuple[float, Interval]:
@@ -63,23 +55,27 @@ def mean_interval(values: Array) -> tuple[float, Interval]:
     return float(np.mean(values)), interval(np.mean, values)
 
 
-def ratio_interval(
-    first: ArrayLike, second: ArrayLike, strata: Sequence[str] | None = None
-) -> Interval:
+def ratio_interval(first: ArrayLike, second: ArrayLike) -> Interval:
     """Interval of the mean of a first policy over that of a second, on the same episodes.
 
+    Both meet the same draw of episodes; the seeds of each are drawn for themselves.
+
     Args:
-        first: Scores of the first policy, one per episode, (episodes,).
-        second: The same of the second policy, in the same order.
-        strata: To which stratum each episode belongs; without it, all are one.
+        first: Scores of the first policy, (episodes,) or (seeds, episodes).
+        second: The same of the second policy, with its own number of seeds.
+
+    Raises:
+        ValueError: If the numbers of episodes differ.
     """
-    one, other = np.asarray(first, np.float64), np.asarray(second, np.float64)
+    one, other = (np.atleast_2d(np.asarray(scores, np.float64)) for scores in (first, second))
+    count = one.shape[1]
+    require(other.shape[1] == count, "episodes of the second", other.shape[1], f"{count}")
 
-    def ratio(drawn: Array, axis: int) -> Any:
-        index = drawn.astype(np.intp)
-        return one[index].mean(axis=axis) / other[index].mean(axis=axis)
+    def ratio(ours: Any, theirs: Any, episodes: Any) -> Any:
+        mean = _crossed(one, ours, episodes).mean(axis=-1)
+        return mean / _crossed(other, theirs, episodes).mean(axis=-1)
 
-    return interval(ratio, np.arange(one.size), strata)
+    return _interval(ratio, len(one), len(other), count)
 
 
 def interquartile_mean(values: Any, axis: int = -1) -> Any:
@@ -135,13 +131,12 @@ class Comparison:
         return f"the data decide: {better} is better than {worse}"
 
 
-def compare(first: ArrayLike, second: ArrayLike, strata: Sequence[str] | None = None) -> Comparison:
+def compare(first: ArrayLike, second: ArrayLike) -> Comparison:
     """Compare two policies on the same episodes.
 
     Args:
         first: Scores of the first policy, one per episode, less being better, (episodes,).
         second: The same of the second policy, in the same order.
-        strata: To which stratum each episode belongs; without it, all are one.
 
     Raises:
         ValueError: If the numbers of episodes differ, or there is none.
@@ -155,9 +150,9 @@ def compare(first: ArrayLike, second: ArrayLike, strata: Sequence[str] | None = 
         first=float(one.mean()),
         second=float(other.mean()),
         difference=float(differences.mean()),
-        difference_ci95=interval(np.mean, differences, strata),
+        difference_ci95=interval(np.mean, differences),
         improvement=float(improvement(differences)),
-        improvement_ci95=interval(improvement, differences, strata),
+        improvement_ci95=interval(improvement, differences),
     )
 
 
@@ -178,3 +173,24 @@ def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array
         sample.size, np.full(sample.size, 1 / sample.size), RESAMPLES
     )
     return shares, np.quantile(drawn @ below / sample.size, (0.025, 0.975), axis=0)
+
+
+def _interval(statistic: Callable[..., Any], *sizes: int) -> Interval:
+    """Interval of a statistic of indices, of which each kind is drawn for itself.
+
+    Args:
+        statistic: A function of one array of indices per kind, (resamples, size).
+        sizes: How many there are of each kind.
+    """
+    rng = np.random.default_rng(0)
+    drawn = [rng.integers(size, size=(RESAMPLES, size)) for size in sizes]
+    parts = zip(*(np.array_split(indices, PARTS) for indices in drawn), strict=True)
+    values = np.concatenate([statistic(*part) for part in parts])
+    low, high = np.quantile(values, (0.025, 0.975))
+    return float(low), float(high)
+
+
+def _crossed(table: Array, seeds: Any, episodes: Any) -> Array:
+    """Every drawn seed on every drawn episode, (resamples, seeds * episodes)."""
+    drawn = table[seeds[:, :, None], episodes[:, None, :]]
+    return np.asarray(drawn.reshape(len(drawn), -1))

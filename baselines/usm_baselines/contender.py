@@ -43,6 +43,7 @@ class Contender:
         factory: Makes the policy from nominal knowledge.
         privileged: Whether it is given true state, and so is no competitor.
         told: What it is told besides the measured position and the reference; empty if unknown.
+        note: What to bear in mind about its scores.
         identity: What its scores depend on besides scenarios and nominal knowledge; None where that
             is not known, as for the code of others.
     """
@@ -51,6 +52,7 @@ class Contender:
     factory: Callable[[Nominal], Any]
     privileged: bool = False
     told: str = ""
+    note: str = ""
     identity: str | None = None
 
     @property
@@ -119,7 +121,7 @@ def registered(name: str, entry: Registration) -> Contender:
         sources = fingerprint("usm_gym", "usm_baselines", package)
         where = [factory.__module__, factory.__qualname__]
         identity = json.dumps([where, settings, sources], sort_keys=True)
-    return Contender(name, entry.factory, entry.privileged, entry.told, identity)
+    return Contender(name, entry.factory, entry.privileged, entry.told, entry.note, identity)
 
 
 def own(name: str) -> Callable[..., Any]:

@@ -44,6 +44,7 @@ class Registration:
         told: What it is told besides the measured position and the reference.
         on_request: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
+        note: What to bear in mind about its scores; empty if nothing.
     """
 
     factory: Callable[..., Policy]
@@ -52,6 +53,7 @@ class Registration:
     told: str = POSITION_ONLY
     on_request: bool = False
     privileged: bool = False
+    note: str = ""
 
 
 _entries: dict[str, Registration] = {}
@@ -66,6 +68,7 @@ def register(
     told: str = POSITION_ONLY,
     on_request: bool = False,
     privileged: bool = False,
+    note: str = "",
 ) -> None:
     """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
 
@@ -80,13 +83,14 @@ def register(
         on_request: Whether to leave it out of evaluations unless it is asked for; its tuned form
             is not left out.
         privileged: Whether it is given true state.
+        note: What to bear in mind about its scores.
 
     Raises:
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    _entries[id] = Registration(factory, summary, chosen, told, on_request, privileged)
+    _entries[id] = Registration(factory, summary, chosen, told, on_request, privileged, note)
     shipped = TUNED / f"{id}.json"
     if shipped.is_file():
         _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
@@ -130,6 +134,7 @@ def tuned(file: GainsFile) -> Registration:
         f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
         told=base.told,
         privileged=base.privileged,
+        note=base.note,
     )
 
 

@@ -1,7 +1,13 @@
 """Intervals, middle halves and verdicts are what they are called."""
 
+import itertools
+import random
+from fractions import Fraction
+from statistics import fmean
+
 import numpy as np
 import pytest
+import scipy
 
 from usm_gym import statistics
 from usm_gym.statistics import (
@@ -19,18 +25,73 @@ def test_an_interval_covers_the_truth_about_as_often_as_it_says() -> None:
     assert 88 <= sum(low <= 1.0 <= high for low, high in limits) <= 99
 
 
-def test_strata_are_resampled_by_themselves() -> None:
-    # Two strata without spread: only a resampling across them could move the mean.
-    values, strata = np.repeat([1.0, 3.0], 25), ["calm"] * 25 + ["rough"] * 25
-    assert interval(np.mean, values, strata) == (2.0, 2.0)
-    low, high = interval(np.mean, values)
-    assert low < 2.0 < high
-
-
 def test_intervals_have_no_randomness() -> None:
     values = np.random.default_rng(1).random(50)
     assert interval(np.mean, values) == interval(np.mean, values)
     assert interval(np.mean, [2.0]) == (2.0, 2.0)
+
+
+def test_seeds_and_scenarios_are_drawn_each_for_themselves_and_crossed() -> None:
+    rng, source = np.random.default_rng(5), random.Random(0)
+    table = rng.exponential(size=(3, 1)) + rng.exponential(size=8) + rng.exponential(size=(3, 8))
+    rows = table.tolist()
+    means = []
+    for _ in range(20_000):
+        episodes = source.choices(range(8), k=8)
+        means.append(fmean(row[k] for row in source.choices(rows, k=3) for k in episodes))
+    low, high = np.quantile(means, (0.025, 0.975))
+    assert interval(np.mean, table) == pytest.approx((low, high), abs=0.03 * (high - low))
+
+
+def test_with_one_seed_it_is_the_ordinary_bootstrap() -> None:
+    values = np.random.default_rng(6).exponential(size=60)
+    for statistic in (np.mean, interquartile_mean):
+        options = {"n_resamples": statistics.RESAMPLES, "method": "percentile"}
+        rng = np.random.default_rng(1)
+        ordinary = scipy.stats.bootstrap([values], statistic, rng=rng, **options)
+        low, high = ordinary.confidence_interval
+        found = interval(statistic, values)
+        assert found == interval(statistic, values[None])
+        assert found == pytest.approx((low, high), abs=0.03 * (high - low))
+
+
+def test_equal_seeds_add_nothing() -> None:
+    values = np.random.default_rng(7).exponential(size=60)
+    low, high = interval(np.mean, values)
+    several = interval(np.mean, np.tile(values, (5, 1)))
+    assert several == pytest.approx((low, high), abs=0.03 * (high - low))
+
+
+def test_a_table_is_covered_where_resampling_episodes_within_each_seed_is_too_narrow() -> None:
+    rng = np.random.default_rng(8)
+    crossed = within = 0
+    for _ in range(80):
+        seeds, episodes = rng.normal(size=(8, 1)), rng.normal(size=30)
+        table = 0.5 * (seeds + episodes + rng.normal(size=(8, 30)))
+        low, high = interval(np.mean, table)
+        crossed += low <= 0.0 <= high
+        drawn = [row[rng.integers(30, size=(1000, 30))].mean(axis=1) for row in table]
+        low, high = np.quantile(np.mean(drawn, axis=0), (0.025, 0.975))
+        within += low <= 0.0 <= high
+    assert 66 <= crossed <= 79  # 83 to 99 %
+    assert within < 40
+
+
+def test_where_scenarios_cancel_a_ratio_is_one_of_seeds() -> None:
+    # Scores are a product of seed and scenario: the ratio of any draw is that of the drawn seeds.
+    scenarios = np.random.default_rng(9).exponential(size=20)
+    ours, theirs = np.array([1.0, 2.0, 4.0]), np.array([3.0, 5.0])
+    draws = itertools.product(
+        itertools.product(ours, repeat=3), itertools.product(theirs, repeat=2)
+    )
+    ratios = sorted(Fraction(fmean(our)) / Fraction(fmean(their)) for our, their in draws)
+    limits = [float(ratios[int(share * len(ratios))]) for share in (0.025, 0.975)]
+    tables = ours[:, None] * scenarios, theirs[:, None] * scenarios
+    assert ratio_interval(*tables) == pytest.approx(limits)
+    # A rival without seeds meets the same draw of scenarios.
+    assert ratio_interval(tables[0][:1], scenarios) == pytest.approx((1.0, 1.0))
+    with pytest.raises(ValueError, match="episodes of the second"):
+        ratio_interval(tables[0], scenarios[:-1])
 
 
 def test_a_ratio_is_of_pairs_and_its_interval_covers_the_truth() -> None:

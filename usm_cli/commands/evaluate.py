@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from rich.table import Table
+from usm_baselines.benchmark.leaderboard_page import MARK
 from usm_baselines.benchmark.results import (
     CompetitorScores,
     EvaluationResult,
@@ -75,8 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
     scenarios = chosen_scenarios(arguments)
     chosen = jobs(chosen_contenders(arguments.policies), scenarios, arguments.time_limit)
     scores, refused = by_name(chosen, scored(chosen, arguments))
-    told = {job.contender.name: job.contender.told for job in chosen}
-    privileged = {job.contender.name for job in chosen if job.contender.privileged}
+    known = {job.contender.name: job.contender for job in chosen}
     result = EvaluationResult(
         suite=suite_name(arguments),
         conditions=scenarios[0].conditions,
@@ -85,9 +85,7 @@ def run(arguments: argparse.Namespace) -> None:
         episodes=len(scenarios),
         scenarios=tuple(scenarios),
         results={
-            name: CompetitorScores.of(
-                evaluation.summary(), competitor=name not in privileged, told=told[name]
-            )
+            name: CompetitorScores.of(evaluation.summary(), **CompetitorScores.about(known[name]))
             for name, evaluation in scores.items()
         },
         refused=refused,
@@ -118,5 +116,7 @@ def table(result: EvaluationResult) -> Table:
         cells += [mm(e.worst) for e in errors] + [mm(e.mean) for e in rms]
         cells += [degrees(e.mean) for e in row.attitude.values()]
         cells.append(figures(row.metrics["thrust_variation"].mean))
-        rows.add_row(name, *cells, str(row.failures))
+        rows.add_row(f"{name} {MARK}" if row.note else name, *cells, str(row.failures))
+    notes = {row.note for row in result.results.values() if row.note}
+    rows.caption = "; ".join(f"{MARK} {note}" for note in sorted(notes)) or None
     return rows

@@ -27,6 +27,6 @@ def run(arguments: argparse.Namespace) -> None:
     for id in ids():
         policy = entry(id)
         marks = [mark for mark in ("on_request", "privileged") if getattr(policy, mark)]
-        said = "".join(f" ({mark.replace('_', ' ')})" for mark in marks)
-        table.add_row(id, policy.summary + said, policy.told)
+        said = [mark.replace("_", " ") for mark in marks] + [policy.note] * bool(policy.note)
+        table.add_row(id, policy.summary + "".join(f" ({each})" for each in said), policy.told)
     output_console().print(table)

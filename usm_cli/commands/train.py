@@ -8,9 +8,7 @@ from typing import Any
 
 from usm_cli.options import check_installed, parse_conditions
 from usm_cli.terminal import output_console, progress_bar
-from usm_gym.support.text import mm
 from usm_gym.support.validation import require
-from usm_gym.task.metrics import MAX_ERROR, axes_of
 
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
@@ -76,7 +74,7 @@ def run(arguments: argparse.Namespace) -> None:
     from usm_agents.learning.plan import Plan, read_plan
     from usm_agents.learning.settings import SETTINGS
     from usm_agents.learning.training import train
-    from usm_agents.learning.validation import best_of
+    from usm_agents.learning.validation import best_of, in_words
 
     names = [name for name, *_ in OPTIONS] + ["omit", "conditions"]
     given = {name: getattr(arguments, name) for name in names}
@@ -103,5 +101,5 @@ def run(arguments: argparse.Namespace) -> None:
         curve = train(plan, folder, report, arguments.resume)
     console = output_console()
     for name, point in (("before", curve[0]), ("best", best_of(curve)), ("last", curve[-1])):
-        errors = " / ".join(mm(point[MAX_ERROR + axis]) for axis in axes_of(point))
-        console.print(f"{name}: {errors} mm after {point['steps']} steps, {point['seconds']:.0f} s")
+        steps, seconds = point["steps"], point["seconds"]
+        console.print(f"{name}: {in_words(point)} after {steps} steps, {seconds:.0f} s")

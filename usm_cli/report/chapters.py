@@ -254,7 +254,7 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
             replay(episodes, home, result.axes, choice, progress),
             Tables(
                 "Scores",
-                f"{SCORES} All seeds together.",
+                f"{SCORES} All seeds together; intervals resample seeds and scenarios.",
                 "where",
                 {name: score_table(rows, {}) for name, rows in tables.items()},
             ),

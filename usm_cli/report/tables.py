@@ -43,6 +43,12 @@ def competes(row: Scores) -> bool:
     return row.competitor if isinstance(row, CompetitorScores) else True
 
 
+def remark(row: Scores) -> str:
+    """What is said below a policy's name."""
+    note = row.note if isinstance(row, CompetitorScores) else ""
+    return note if competes(row) else "no competitor"
+
+
 def lead_of(row: Scores) -> Lead | None:
     """A row's lead over the next row, if it has one."""
     return row.beats_next if isinstance(row, Standing) else None
@@ -70,7 +76,7 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
     for name, row in rows.items():
         errors = row.errors
         halves = [interquartile_mean(row.per_episode[MAX_ERROR + axis]) for axis in axes]
-        cells = [Cell(name, name, "" if competes(row) else "no competitor")]
+        cells = [Cell(name, name, remark(row))]
         cells += [Cell(mm(e.mean), e.mean, interval(e)) for e in errors.values()]
         cells.append(Cell("", row.objective, marks=scale.marks(errors)))
         cells += [length(float(half)) for half in halves]

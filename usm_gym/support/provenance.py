@@ -10,7 +10,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from packaging.version import Version
+
 PACKAGES = ("usm-gym", "gymnasium", "numpy", "numba", "scipy", "stable-baselines3", "torch")
+# The first version with today's plant. What an earlier one trained or scored belongs to its own.
+PLANT_SINCE = Version("0.2.0")
 
 
 def provenance(seeds: Any) -> dict[str, Any]:
@@ -27,6 +31,15 @@ def provenance(seeds: Any) -> dict[str, Any]:
         "seeds": seeds,
         "command": _text(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])),
     }
+
+
+def older_plant(version: str | None) -> bool:
+    """Whether a version of usm-gym is known to have another plant than this one.
+
+    Raises:
+        ValueError: If it is no version.
+    """
+    return version is not None and Version(version) < PLANT_SINCE
 
 
 def _text(argument: str) -> str:

@@ -26,6 +26,7 @@ from usm_baselines.registry import POSITION_ONLY, entry, make, register
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
+from usm_gym.support.provenance import older_plant
 from usm_gym.support.validation import UsageError, explaining, in_one_line, require, validated
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
@@ -218,6 +219,13 @@ def register_shipped() -> None:
     """Register the shipped agents under the names of their folders."""
     for description in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}")):
         folder = description.parent
-        said = json.loads(description.read_text(encoding="utf-8"))
+        agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
-        register(folder.name, factory, said["summary"], told=told_with(said["base"]))
+        told, note = told_with(agent["base"]), note_of(agent["training"])
+        register(folder.name, factory, agent["summary"], told=told, note=note)
+
+
+def note_of(training: Mapping[str, Any]) -> str:
+    """What to bear in mind about an agent of such a training."""
+    version = training["provenance"]["version"]
+    return f"trained on the plant of {version}" if older_plant(version) else ""

@@ -2,7 +2,8 @@
 
 A validation is a point of the learning curve, as `curve.json` has it: `steps` and `seconds` of the
 training so far, the means of `max_error_AXIS` (m), `ANGLE_error` (rad) and `thrust_variation`
-(N/s) over the held-out scenarios, and in how many of them the robot was lost, `failures`.
+(N/s) over the held-out scenarios, and in how many of them the robot was lost, `failures`. Curves of
+version 0.1.0 lack the angles.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from usm_agents.artifact.network import Network
 from usm_agents.learning.plan import TEST_SEED, Plan
 from usm_agents.residual.task import Residual, ResidualPolicy
 from usm_gym.evaluation import evaluate
 from usm_gym.suites import unseen
 from usm_gym.support.seeding import VALIDATION, stream
+from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
@@ -66,19 +70,14 @@ def best_of(curve: Sequence[Validation]) -> Validation:
     return min(curve, key=objective)
 
 
-def is_validation(value: Any) -> bool:
-    """Whether a value, as JSON holds it, is a validation."""
-    if not isinstance(value, dict) or not axes_of(value):
-        return False
-    names = ["steps", "seconds", *(MAX_ERROR + axis for axis in axes_of(value))]
-    names += ["thrust_variation", "failures"]
-    return all(isinstance(value.get(name), (int, float)) for name in names)
-
-
 def in_words(validation: Validation) -> str:
     """A validation as a progress bar shows it."""
-    errors = (f"{1e3 * validation[MAX_ERROR + axis]:.2f}" for axis in axes_of(validation))
-    return f"{' / '.join(errors)} mm at {validation['thrust_variation']:.0f} N/s"
+    errors = (mm(validation[MAX_ERROR + axis]) for axis in axes_of(validation))
+    angles = (
+        f", {np.degrees(validation[angle + ANGLE_ERROR]):.1f}°" for angle in attitude_of(validation)
+    )
+    variation = f"{validation['thrust_variation']:.0f} N/s"
+    return f"{' / '.join(errors)} mm{''.join(angles)} at {variation}"
 
 
 def score_unseen(

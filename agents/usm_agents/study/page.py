@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import degrees
 
 from usm_agents.study.results import Claim, Dissection, ForceShares, Rival, StudyResult, Trained
 from usm_agents.study.scores import best_so_far, steps_to
+from usm_gym.support.provenance import older_plant
 from usm_gym.support.text import figures, mm
+from usm_gym.task.metrics import ANGLE_ERROR, attitude_of
 
 LEGEND = """\
 Largest position error after settling, mm, over unseen scenarios and all seeds: mean, and mean of
-the middle half of the episodes, each with its 95 % interval (episodes are resampled within each
-seed); means of the best and of the worst seed; thrust variation, N/s, and effort, N; episodes lost.
+the middle half of the episodes, each with its 95 % interval, for which seeds and scenarios are
+resampled; means of the best and of the worst seed; thrust variation, N/s, and effort, N; episodes
+lost.
 """
-
+EARLIER = """\
+**This study is of the plant of {version}, whose step has been mended since.** Its figures are not
+to be compared with those of later versions, for which the agents are trained anew.
+"""
+ABLATIONS = """\
+A row of one seed is one training. Its interval is that of the scenarios alone, and a difference
+from another row may be one between seeds.
+"""
 
 AGAINST = """\
-Ratio of the means in {axes} over all seeds, with its 95 % interval; in what share of scenarios the
-agent, as its seed 0, is better in {all} axes; and how many of its seeds are better in {all} means.
+Ratio of the means in {axes} over all seeds, with its 95 % interval, for which seeds and scenarios
+are resampled; where it holds 1, the data do not decide. Then in what share of scenarios the agent,
+as its seed 0, is better in {all} axes; and how many of its seeds are better in {all} means.
 """
 SOON = """\
-Steps after which the best agents so far are as good as the best ones of another training, by the
-validated error {sum}, the median over the seeds; trainings are validated every quarter of a million
-steps.
+Steps after which the best agents so far are as good as the best ones of another training: by the
+objective on held-out scenarios, which adds to {sum} the prices of thrust variation and, where the
+curves have them, of heading errors; the median over the seeds. Trainings are validated every
+quarter of a million steps.
 """
 ELSEWHERE = """\
 Mean errors {axes}, mm, under other conditions than those of the training: without noise, lag and
@@ -45,7 +58,11 @@ def markdown(study: StudyResult) -> str:
         "sum": " + ".join(study.axes),
         "all": "both" if len(study.axes) == 2 else "all",
     }
-    parts = ["# Study of residual agents\n", LEGEND]
+    parts = ["# Study of residual agents\n"]
+    version = study.provenance.version
+    if older_plant(version):
+        parts += [EARLIER.format(version=version)]
+    parts += [LEGEND]
     if agents:
         parts += ["## Agents\n", table(agents, study.home)]
         parts += ["## Classical policies\n", table(study.rivals, study.home)]
@@ -58,7 +75,7 @@ def markdown(study: StudyResult) -> str:
         parts += ["## What the agents do to their bases\n", DISSECTED.format(**words)]
         parts += [taken(study.dissected), "![Spectra of the forces](spectra.png)\n"]
     if study.ablations:
-        parts += ["## Ablations\n", table(study.ablations, study.home)]
+        parts += ["## Ablations\n", ABLATIONS, table(study.ablations, study.home)]
     parts += ["## Learning curves\n", "![Error against steps](curves.png)\n"]
     parts += ["## Commands\n", commands(study)]
     return "\n".join(parts)
@@ -72,6 +89,8 @@ def table(rows: Mapping[str, Trained | Rival], home: str) -> str:
     columns = [f"{axis}, mm" for axis in first.axes]
     columns += [f"middle half {axis}" for axis in first.axes]
     columns += ["seeds", *(f"seeds {axis}" for axis in first.axes)] if several else []
+    angles = attitude_of(first.metrics)
+    columns += [f"{angle}, °" for angle in angles]
     lines = _head("policy", [*columns, "variation, N/s", "thrust, N", "lost"])
     for name, row in scores.items():
         errors = row.seed_errors
@@ -80,6 +99,7 @@ def table(rows: Mapping[str, Trained | Rival], home: str) -> str:
         if several:
             seeds = [error.seeds for error in errors]
             cells += [str(len(seeds[0])), *(f"{mm(min(m))} to {mm(max(m))}" for m in seeds)]
+        cells += [figures(degrees(row.metrics[angle + ANGLE_ERROR].mean)) for angle in angles]
         cells += [figures(row.metrics[key].mean) for key in ("thrust_variation", "thrust_effort")]
         lines.append(_line([name, *cells, str(row.failures)]))
     return "\n".join(lines) + "\n"
@@ -118,8 +138,8 @@ def soon(agents: Mapping[str, Trained]) -> str:
     for name, agent in agents.items():
         cells = [name]
         for other in agents.values():
-            error = min(best_so_far(other.curves).values())
-            steps = steps_to(agent.curves, error) if other.mode == agent.mode else None
+            best = min(best_so_far(other.curves).values())
+            steps = steps_to(agent.curves, best) if other.mode == agent.mode else None
             cells.append("" if steps is None else f"{steps / 1e6:.2f} M")
         lines.append(_line(cells))
     return "\n".join(lines) + "\n"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from usm_baselines.benchmark.results import Failures, MiddleSummary, Scores
 
@@ -26,7 +28,8 @@ class CurvePoint(Part):
     Attributes:
         steps: After how many steps.
         seconds: After how much time, s.
-        means: Means of the largest errors by axis, m, and of the thrust variation, N/s.
+        means: Means of the largest errors by axis, m, and of the attitude, rad, which old curves
+            lack, and of the thrust variation, N/s.
         failures: How many episodes lost the robot.
     """
 
@@ -49,7 +52,7 @@ class CurvePoint(Part):
 
 @validated
 class SeedSummary(MiddleSummary):
-    """A metric over the episodes of all seeds.
+    """A metric over the episodes of all seeds; intervals resample seeds and episodes.
 
     Attributes:
         seeds: Means by seed.
@@ -69,6 +72,10 @@ class SeedScores(Scores):
 
     order: ClassVar[tuple[str, ...]] = ("failures", "per_episode", "metrics")
     metrics: Mapping[str, SeedSummary]
+
+    def table(self, metric: str) -> NDArray[np.float64]:
+        """A metric by seed and episode, (seeds, episodes)."""
+        return np.reshape(self.per_episode[metric], (len(self.metrics[metric].seeds), -1))
 
     @property
     def seed_errors(self) -> list[SeedSummary]:

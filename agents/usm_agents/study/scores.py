@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from usm_baselines.benchmark.scoring import Job, Refusal, score_all
 from usm_baselines.contender import Contender, contender
 
@@ -24,17 +25,17 @@ from usm_agents.study.results import (
     Trained,
 )
 from usm_agents.study.trainings import StudyTraining
-from usm_gym.evaluation import Evaluation, joined
+from usm_gym.evaluation import Evaluation
 from usm_gym.statistics import interquartile_mean, interval, ratio_interval
 from usm_gym.suites import unseen
 from usm_gym.support.results import Provenance
 from usm_gym.support.validation import UsageError
 from usm_gym.task.conditions import FIELD
-from usm_gym.task.metrics import MAX_ERROR, axes_of
+from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Mode
 
-# Kept of every episode, by axis and besides.
+# Kept of every episode, by axis and besides; so are the errors of the attitude.
 ERRORS, OTHERS = ("max_error", "settled_error"), ("thrust_variation", "thrust_effort")
 
 
@@ -138,30 +139,32 @@ def study(
 
 
 def over_seeds(parts: Sequence[Evaluation]) -> SeedScores:
-    """Scores over seeds, with middle half and the seeds' means.
+    """Scores of some seeds, all of which have met the same episodes."""
+    scores = parts[0].per_episode
+    kept = [f"{name}_{axis}" for name in ERRORS for axis in axes_of(scores)]
+    kept += [angle + ANGLE_ERROR for angle in attitude_of(scores)]
+    tables = {
+        name: np.array([part.per_episode[name] for part in parts]) for name in (*kept, *OTHERS)
+    }
+    return summarised(tables, failures=sum(int(part.failed.sum()) for part in parts))
 
-    Seeds are strata of the bootstrap, whose episodes are resampled; episodes are in the order of
-    the seeds.
-    """
-    scores = joined(parts)
-    labels = [str(seed) for seed, part in enumerate(parts) for _ in part.failed]
-    axes = axes_of(scores.per_episode)
-    kept = (*(f"{name}_{axis}" for name in ERRORS for axis in axes), *OTHERS)
-    metrics = {}
-    for name in kept:
-        values = scores.per_episode[name]
-        metrics[name] = SeedSummary(
-            mean=float(values.mean()),
-            ci95=interval(np.mean, values, labels),
-            iqm=float(interquartile_mean(values)),
-            iqm_ci95=interval(interquartile_mean, values, labels),
-            worst=float(values.max()),
-            seeds=tuple(float(part.per_episode[name].mean()) for part in parts),
-        )
+
+def summarised(tables: Mapping[str, NDArray[np.float64]], failures: int) -> SeedScores:
+    """Scores from tables by metric, (seeds, episodes), of which both are resampled."""
     return SeedScores(
-        failures=int(scores.failed.sum()),
-        per_episode={name: tuple(scores.per_episode[name].tolist()) for name in kept},
-        metrics=metrics,
+        failures=failures,
+        per_episode={name: tuple(table.ravel().tolist()) for name, table in tables.items()},
+        metrics={
+            name: SeedSummary(
+                mean=float(table.mean()),
+                ci95=interval(np.mean, table),
+                iqm=float(interquartile_mean(table.ravel())),
+                iqm_ci95=interval(interquartile_mean, table),
+                worst=float(table.max()),
+                seeds=tuple(table.mean(axis=1).tolist()),
+            )
+            for name, table in tables.items()
+        },
     )
 
 
@@ -181,13 +184,11 @@ def claims(rows: Mapping[str, Trained], rivals: Mapping[str, Rival]) -> dict[str
 def against(ours: SeedScores, theirs: SeedScores) -> Claim:
     """What an agent is to a policy without seeds."""
     ratios, intervals, better, seeds = [], [], [], []
-    for axis in ours.axes:
-        their = np.array(theirs.per_episode[MAX_ERROR + axis])
-        our = np.array(ours.per_episode[MAX_ERROR + axis]).reshape(-1, len(their))
-        labels = [str(seed) for seed, part in enumerate(our) for _ in part]
+    for metric in (MAX_ERROR + axis for axis in ours.axes):
+        our, their = ours.table(metric), theirs.table(metric)
         ratios.append(float(our.mean() / their.mean()))
-        intervals.append(ratio_interval(our.ravel(), np.tile(their, len(our)), labels))
-        better.append(our[0] < their)
+        intervals.append(ratio_interval(our, their))
+        better.append(our[0] < their[0])
         seeds.append(our.mean(axis=1) < their.mean())
     return Claim(
         ratio=tuple(ratios),
@@ -198,14 +199,14 @@ def against(ours: SeedScores, theirs: SeedScores) -> Claim:
 
 
 def best_so_far(curves: Mapping[str, Sequence[CurvePoint]]) -> dict[int, float]:
-    """By steps: validated error of the best agent so far, the median over the seeds, m."""
-    errors = [
+    """By steps: validated objective of the best agent so far, the median over the seeds, mm."""
+    best = [
         np.minimum.accumulate([point.objective for point in curve]) for curve in curves.values()
     ]
-    points = zip(next(iter(curves.values())), zip(*errors, strict=False), strict=False)
-    return {point.steps: float(np.median(totals)) for point, totals in points}
+    points = zip(next(iter(curves.values())), zip(*best, strict=False), strict=False)
+    return {point.steps: float(np.median(values)) for point, values in points}
 
 
-def steps_to(curves: Mapping[str, Sequence[CurvePoint]], error: float) -> int | None:
+def steps_to(curves: Mapping[str, Sequence[CurvePoint]], objective: float) -> int | None:
     """After how many steps the best agents so far are as good as that; see `best_so_far`."""
-    return next((steps for steps, best in best_so_far(curves).items() if best <= error), None)
+    return next((steps for steps, best in best_so_far(curves).items() if best <= objective), None)

@@ -287,8 +287,7 @@ def standing(
     attitude = [angle + ANGLE_ERROR for angle in attitude_of(scores.per_episode)]
     kept = (*errors, *attitude, "thrust_variation", "failed")
     summary["per_episode"] = {name: summary["per_episode"][name] for name in kept}
-    fields = {"competitor": not contender.privileged, "told": contender.told}
-    return Standing.of(summary, **fields, rank=rank, beats_next=lead)
+    return Standing.of(summary, **Standing.about(contender), rank=rank, beats_next=lead)
 
 
 def point(scores: Evaluation) -> FrontPoint:

@@ -18,6 +18,8 @@ from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
 # Whose gains are kept in the README beside better ones: the paper's.
 PAPER = ("sta", "pd")
+# Marks a policy about whose scores there is a note.
+MARK = "†"
 # Metrics without columns in the CSV file.
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
@@ -52,7 +54,7 @@ def table(rows: Mapping[str, Standing]) -> str:
         lead = row.beats_next
         decision = "" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})"
         lines.append(_line(places[id], id, row, [*cells, str(row.failures), decision]))
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_notes(rows)]) + "\n"
 
 
 def brief_table(rows: Mapping[str, Standing]) -> str:
@@ -78,7 +80,7 @@ def brief_table(rows: Mapping[str, Standing]) -> str:
         variation = figures(row.metrics["thrust_variation"].mean)
         cells = [row.told, *map(_mean, errors), rms, worst, *attitude, variation]
         lines.append(_line(places[id], id, row, [*cells, str(row.failures)]))
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_notes(rows)]) + "\n"
 
 
 def rank_labels(rows: Mapping[str, Standing]) -> dict[str, str]:
@@ -157,8 +159,14 @@ def _head(columns: Sequence[str]) -> list[str]:
 
 
 def _line(place: str, id: str, row: Standing, cells: Sequence[str]) -> str:
-    name = id if row.competitor else f"{id} (no competitor)"
+    name = f"{id} {MARK}" if row.note else id
+    name += "" if row.competitor else " (no competitor)"
     return "| " + " | ".join([place, name, *cells]) + " |"
+
+
+def _notes(rows: Mapping[str, Standing]) -> list[str]:
+    notes = sorted({row.note for row in rows.values() if row.note})
+    return [f"\n{MARK} {'; '.join(notes)}."] if notes else []
 
 
 def _mean(error: Summary) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, TypeAdapter
 
+from usm_baselines.contender import Contender
 from usm_gym.statistics import Comparison
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
@@ -123,10 +124,18 @@ class CompetitorScores(Scores):
     Attributes:
         competitor: False if it is told more than a vehicle knows.
         told: What it is told besides the measured position and the reference; empty if unknown.
+        note: What to bear in mind about its scores.
     """
 
     competitor: Switch
     told: str = ""
+    note: str = ""
+
+    @staticmethod
+    def about(contender: Contender) -> dict[str, Any]:
+        """What is kept of a policy besides its scores."""
+        competes = not contender.privileged
+        return {"competitor": competes, "told": contender.told, "note": contender.note}
 
 
 def require_alike(rows: Iterable[Scores]) -> None:

@@ -13,7 +13,9 @@ def test_weights_beyond_all_bounds_are_refused(weight):
 
 
 def curve(*errors):
-    return [{"max_error_x": error, "max_error_y": error} for error in errors]
+    return [
+        {"max_error_x": error, "max_error_y": error, "thrust_variation": 0.0} for error in errors
+    ]
 
 
 @pytest.mark.parametrize(

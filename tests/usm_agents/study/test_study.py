@@ -3,6 +3,7 @@
 import json
 import pickle
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -12,16 +13,20 @@ from usm_agents.artifact.folder import read_agent
 from usm_agents.learning.plan import Plan, write_plan
 from usm_agents.learning.settings import SETTINGS
 from usm_agents.learning.training import train
-from usm_agents.study import dissection, plans, scores, trainings
+from usm_agents.study import dissection, page, plans, scores, trainings
 from usm_agents.study.dissection import lateness
 from usm_agents.study.plans import PLANS, SEEDS, TRANSFER
-from usm_agents.study.results import CurvePoint
+from usm_agents.study.results import CurvePoint, StudyResult
 from usm_agents.study.scores import best_so_far, steps_to
 from usm_agents.study.trainings import planned
 
 from usm_cli.program import main
+from usm_gym.evaluation import Evaluation
+from usm_gym.statistics import interval, ratio_interval
 from usm_gym.support.files import write_json
 from usm_gym.task.conditions import FIELD
+
+STORED = Path(__file__).parents[3] / "results" / "0.1.0" / "study" / "study.json"
 
 
 @pytest.fixture(autouse=True)
@@ -147,20 +152,69 @@ def test_lateness_is_found():
     assert lateness(np.roll(needed, -3, axis=0), needed) == -3
 
 
-def test_steps_to_an_error_are_those_of_the_best_agents_so_far():
+def test_scores_over_seeds_are_those_of_their_tables():
+    rng = np.random.default_rng(1)
+    names = ["max_error_x", "settled_error_x", "heading_error", *scores.OTHERS]
+    parts = [
+        Evaluation(
+            per_episode={name: rng.exponential(size=60) for name in names},
+            failed=np.arange(60) == seed,
+        )
+        for seed in range(3)
+    ]
+    found = scores.over_seeds(parts)
+    assert (list(found.metrics), found.failures, found.axes) == (names, 3, ("x",))
+    for name, summary in found.metrics.items():
+        table = np.stack([part.per_episode[name] for part in parts])
+        assert (found.table(name) == table).all()
+        assert summary.mean == pytest.approx(table.mean())
+        assert summary.seeds == pytest.approx(table.mean(axis=1))
+        assert summary.iqm == pytest.approx(np.sort(table.ravel())[45:135].mean())
+        assert summary.worst == table.max()
+        assert summary.ci95 == interval(np.mean, table)
+
+    rival = scores.over_seeds(parts[:1])
+    claim = scores.against(found, rival)
+    assert claim.ratio_ci95 == (
+        ratio_interval(found.table("max_error_x"), rival.table("max_error_x")),
+    )
+    assert claim.better_in_both == 0.0  # its seed 0 is the rival itself
+    means = found.metrics["max_error_x"].seeds
+    assert claim.better_seeds == sum(mean < means[0] for mean in means)
+
+
+def test_the_stored_study_is_summarised_as_its_episodes_say():
+    stored = StudyResult.read(STORED)
+    ours, theirs = (
+        row.scores[stored.home] for row in (stored.rows["residual-ppo"], stored.rivals["lqg-tuned"])
+    )
+    tables = {name: ours.table(name) for name in ours.metrics}
+    assert scores.summarised(tables, ours.failures) == ours
+    assert scores.against(ours, theirs) == stored.against["residual-ppo"]["lqg-tuned"]
+
+
+def test_a_study_of_an_older_plant_says_so_in_its_head():
+    stored = StudyResult.read(STORED)
+    said = "of the plant of 0.1.0, whose step has been mended since"
+    assert said in page.markdown(stored).partition("## Agents")[0]
+    today = replace(stored, provenance=replace(stored.provenance, version="0.2.0"))
+    assert "mended" not in page.markdown(today)
+
+
+def test_steps_to_an_objective_are_those_of_the_best_agents_so_far():
     def curve(*errors):
         return [
             CurvePoint(
                 steps=100 * k,
                 seconds=0.0,
-                means={"max_error_x": error, "max_error_y": 0.0},
+                means={"max_error_x": 1e-3 * error, "max_error_y": 0.0, "thrust_variation": 0.0},
                 failures=0,
             )
             for k, error in enumerate(errors)
         ]
 
     curves = {"0": curve(5.0, 3.0, 1.0), "1": curve(5.0, 1.0, 9.0)}
-    assert best_so_far(curves) == {0: 5.0, 100: 2.0, 200: 1.0}
+    assert best_so_far(curves) == pytest.approx({0: 5.0, 100: 2.0, 200: 1.0})
     assert steps_to(curves, 5.0) == 0
     assert steps_to(curves, 1.9) == 200
     assert steps_to(curves, 0.5) is None

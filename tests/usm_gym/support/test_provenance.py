@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import usm_gym
+from usm_gym.support.provenance import older_plant
 
 COMMIT = "from usm_gym.support.provenance import provenance; print(provenance(0)['commit'])"
 
@@ -51,3 +52,12 @@ def test_a_package_installed_inside_another_repository_has_no_commit_of_it(check
     folder, _ = checkout
     shutil.move(folder / "usm_gym", folder / "site-packages" / "usm_gym")
     assert commit(folder / "site-packages") == "None"
+
+
+def test_a_version_has_an_older_plant_or_not():
+    assert [older_plant(version) for version in ("0.1.0", "0.2.0", "0.10.0")] == [
+        True,
+        False,
+        False,
+    ]
+    assert not older_plant(None)
