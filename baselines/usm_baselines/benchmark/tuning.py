@@ -22,7 +22,7 @@ import optuna
 from optuna import Study
 from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.exceptions import StorageInternalError
-from optuna.trial import TrialState
+from optuna.trial import FrozenTrial, TrialState
 from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
@@ -43,14 +43,17 @@ from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
 # Trials asked for at once, from what is known before all of them.
-ROUND = 8
+ROUND = 4
 # In every so many-th scenario commands take effect a period late and thrusters lag more, by a
 # factor; the policy is not told.
 MARGIN_EVERY, MARGIN_DELAY, MARGIN_LAG = 8, 1, 1.3
 # Objective of a trial that has no score, mm.
 FAILED = 1e4
 # Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.
-STARTUP_TRIALS = 2 * ROUND
+STARTUP_TRIALS = 16
+# Objectives that are this close to the best are as good; of these trials the one is taken whose
+# gains are nearest to the middle of their ranges.
+AS_GOOD = 0.01
 # Attributes of a trial: its objective, or None if it was given up early; and why it has no score.
 # The names stand in the storages of tunings that go on.
 OBJECTIVE, REFUSED = "found", "refused"
@@ -190,8 +193,9 @@ def tune(
     with _usable(storage, StorageInternalError, SQLAlchemyError), _held(storage, problem.study):
         study = _study(problem, storage)
         _search(study, problem, workers, progress)
-        best, value = dict(study.best_params), study.best_value
-        reason = study.best_trial.user_attrs.get(REFUSED)
+        chosen = _chosen(study, problem.space)
+        best, value = dict(chosen.params), chosen.value or 0.0
+        reason = chosen.user_attrs.get(REFUSED)
         pruned = len(study.get_trials(deepcopy=False, states=[TrialState.PRUNED]))
     if value >= FAILED:
         raise UsageError(f"no trial of {problem.policy} has a score: {reason}")
@@ -308,6 +312,17 @@ def _joined(first: Evaluation | Refusal, second: Evaluation | Refusal) -> Evalua
     if isinstance(first, Refusal):
         return first
     return second if isinstance(second, Refusal) else joined([first, second])
+
+
+def _chosen(study: Study, space: Space) -> FrozenTrial:
+    """The trial that is taken, of those that are as good as the best."""
+    limit = (1.0 + AS_GOOD) * study.best_value
+    trials = study.get_trials(deepcopy=False, states=[TrialState.COMPLETE])
+
+    def distance(trial: FrozenTrial) -> float:
+        return max(abs(span.place(trial.params[name]) - 0.5) for name, span in space.items())
+
+    return min((trial for trial in trials if (trial.value or 0.0) <= limit), key=distance)
 
 
 def _finished(study: Study) -> int:

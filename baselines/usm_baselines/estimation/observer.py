@@ -24,7 +24,7 @@ OBSERVER_GAIN = Gain(
     55.0,
     "m/s^3",
     "L of the observer; bounds the rate of the disturbance",
-    tuned=(1e-3, 1e4),
+    tuned=(1e-2, 1e4),
     positive=True,
 )
 K2_EXPONENT = Gain(PRINTED, "1", "exponent of L in k2: 0.5 as printed, or 2/3")

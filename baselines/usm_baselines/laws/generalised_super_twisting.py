@@ -52,7 +52,7 @@ from usm_gym.task.nominal import Nominal
 # What both forms share.
 SLOPE = Gain(0.6, "1/s", "lambda of (10)", tuned=SURFACE)
 LINEAR = Gain(
-    50.0, "(s/m)^(1/2)", "weight of the linear term beside the square root", tuned=(0.1, 1e4)
+    50.0, "(s/m)^(1/2)", "weight of the linear term beside the square root", tuned=(0.01, 1000.0)
 )
 
 

@@ -44,7 +44,7 @@ class JointLQGGains(NamedTuple):
         5e-5,
         "m/N",
         "error that is as bad as a change of the force by 1 N in a period",
-        tuned=(1e-7, 1e-1),
+        tuned=(1e-7, 1e-2),
         positive=True,
     )
     heading_gain: float = HEADING_GAIN

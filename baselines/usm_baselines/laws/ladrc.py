@@ -24,14 +24,14 @@ class LADRCGains(NamedTuple):
     """Gains of linear active-disturbance-rejection control."""
 
     observer_bandwidth: float = Gain(
-        60.0, "rad/s", "omega_o of the observer", tuned=(1.0, 1000.0), positive=True
+        60.0, "rad/s", "omega_o of the observer", tuned=(1.0, 2000.0), positive=True
     )
-    controller_bandwidth: float = Gain(4.0, "rad/s", "omega_c of the loop", tuned=(0.1, 100.0))
+    controller_bandwidth: float = Gain(4.0, "rad/s", "omega_c of the loop", tuned=(0.1, 30.0))
     inertia: float = Gain(
         17.0,
         "kg",
         "1 / b_0: force over the acceleration that it is taken to cause",
-        tuned=(1.0, 1000.0),
+        tuned=(2.0, 200.0),
         positive=True,
     )
     heading_gain: float = HEADING_GAIN

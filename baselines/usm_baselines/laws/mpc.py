@@ -50,7 +50,7 @@ class MPCGains(NamedTuple):
         5e-5,
         "m/N",
         "error that is as bad as a change of the force by 1 N in a period",
-        tuned=(1e-7, 1e-1),
+        tuned=(1e-7, 1e-2),
         positive=True,
     )
     horizon: float = Gain(0.2, "s", "how far it looks ahead", tuned=(0.04, 0.5), positive=True)

@@ -38,9 +38,9 @@ class SlidingModeGains(NamedTuple):
     observer_gain: float = OBSERVER_GAIN
     k2_exponent: float = K2_EXPONENT
     surface: float = Gain(14.0, "1/s", "lambda", tuned=SURFACE, positive=True)
-    eta: float = Gain(0.8, "m/s^2", "acceleration of the switching term", tuned=(1e-2, 100.0))
+    eta: float = Gain(0.8, "m/s^2", "acceleration of the switching term", tuned=(1e-2, 30.0))
     boundary: float = Gain(
-        0.7, "m/s", "half the width of the boundary layer", tuned=(1e-4, 100.0), positive=True
+        0.7, "m/s", "half the width of the boundary layer", tuned=(1e-3, 30.0), positive=True
     )
     heading_gain: float = HEADING_GAIN
 
