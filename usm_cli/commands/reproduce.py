@@ -1,4 +1,4 @@
-"""`usm reproduce`: regenerate the paper's Table 1 and figures, and study its open items."""
+"""`usm reproduce`: run the paper's Table 1 and figures anew, and study its open items."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def add_to(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "reproduce",
-        help="regenerate the paper's Table 1 and figures",
+        help="run the paper's Table 1 and figures anew",
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )

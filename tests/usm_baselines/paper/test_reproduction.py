@@ -1,4 +1,4 @@
-"""Table 1 made anew keeps to the paper's, and its bits do not depend on the workers."""
+"""Table 1 run anew keeps to the paper's, and its bits do not depend on the workers."""
 
 import dataclasses
 
