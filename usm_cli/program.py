@@ -55,7 +55,7 @@ A first look:
   usm tune POLICY              search for better gains
   usm train --output DIR       train an agent that adds thrust to a policy
   usm study residual           train agents and see what their ingredients contribute
-  usm reproduce                regenerate the paper's Table 1 and figures
+  usm reproduce                run the paper's Table 1 and figures anew
   usm bench                    measure the speed on this machine
 """
 

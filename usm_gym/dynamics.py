@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout
 from usm_gym.plant.chain import Plant, accelerate_all
-from usm_gym.robot import Hydrodynamics, Robot
+from usm_gym.robot import Drag, Hydrodynamics, Robot
 from usm_gym.support.validation import UsageError, brief, real_array, require
 
 Array = NDArray[np.float64]
 
 HYDRODYNAMICS: tuple[Hydrodynamics, ...] = get_args(Hydrodynamics)
+DRAG: tuple[Drag, ...] = get_args(Drag)
 # States that are worked on at a time; the kernel needs some 3 kB per state.
 CHUNK = 1024
 
@@ -29,6 +30,7 @@ def accelerations(
     thruster_forces: ArrayLike,
     current: ArrayLike = (0.0, 0.0),
     hydrodynamics: Hydrodynamics = "consistent",
+    drag: Drag = "linear and quadratic",
 ) -> tuple[Array, Array]:
     """Compute the accelerations of a robot in given states (docs/model.md, equation 10).
 
@@ -46,18 +48,20 @@ def accelerations(
         thruster_forces: Forces of the thrusters in layout order, N, shape (..., thrusters).
         current: Velocity of the water in the global frame, constant, m/s, shape (..., 2).
         hydrodynamics: "consistent" (Kirchhoff's added mass) or "kelasidi2014" (as published).
+        drag: "linear and quadratic" (as published) or "quadratic" (without the linear terms).
 
     Returns:
         Angular accelerations, rad/s^2, shape (..., n), and the acceleration of the centre of mass
         in the global frame, m/s^2, shape (..., 2).
 
     Raises:
-        ValueError: If a shape is wrong, shapes do not broadcast, a value is not finite or the form
+        ValueError: If a shape is wrong, shapes do not broadcast, a value is not finite or a form
             is unknown.
     """
     n = robot.links
     allowed = " or ".join(map(repr, HYDRODYNAMICS))
     require(hydrodynamics in HYDRODYNAMICS, "hydrodynamics", hydrodynamics, allowed)
+    require(drag in DRAG, "drag", drag, " or ".join(map(repr, DRAG)))
     given = {
         "theta": _vectors("theta", theta, n),
         "theta_dot": _vectors("theta_dot", theta_dot, n),
@@ -67,7 +71,7 @@ def accelerations(
         "current": _vectors("current", current, 2),
     }
     batch, states = _broadcast(given)
-    plant = plant_of(robot, 0.0, hydrodynamics=hydrodynamics)
+    plant = plant_of(robot, 0.0, hydrodynamics=hydrodynamics, drag=drag)
     size = len(states[0])
     theta_ddot, p_ddot = np.empty((size, n)), np.empty((size, 2))
     for first in range(0, size, CHUNK):

@@ -9,7 +9,7 @@ from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Plant
 from usm_gym.plant.joints import filter_coefficients
 from usm_gym.plant.thrusters import lag_shares
-from usm_gym.robot import Hydrodynamics, Robot
+from usm_gym.robot import Drag, Hydrodynamics, Robot
 
 
 def plant_of(
@@ -19,6 +19,7 @@ def plant_of(
     substeps: int = 1,
     euler: bool = False,
     hydrodynamics: Hydrodynamics = "consistent",
+    drag: Drag = "linear and quadratic",
     shifts: int = 0,
     moving_water: bool = False,
 ) -> Plant:
@@ -31,6 +32,7 @@ def plant_of(
         euler: Whether to take forces at the beginning of a step, by Euler's forward method, rather
             than in its middle.
         hydrodynamics: Form of the added mass.
+        drag: Terms of the drag.
         shifts: Largest number of changes of the joint references in any episode.
         moving_water: Whether the water's velocity changes in any episode.
     """
@@ -40,6 +42,7 @@ def plant_of(
         J=robot.link_inertia,
         lead=0.0 if euler else 0.5 * step,
         kirchhoff=float(hydrodynamics == "consistent"),
+        linear_drag=float(drag == "linear and quadratic"),
         links=robot.links,
         thruster_links=robot.thruster_links,
         thruster_is_normal=robot.thruster_is_normal,

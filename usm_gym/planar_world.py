@@ -213,6 +213,7 @@ class PlanarWorld(World):
             substeps=conditions.substeps,
             euler=conditions.integrator == "explicit",
             hydrodynamics=conditions.hydrodynamics,
+            drag=conditions.drag,
             shifts=shifts,
             moving_water=moving,
         )

@@ -18,6 +18,8 @@ Stiffness = Annotated[Number, Field(ge=0, le=1e6)]
 Damping = Annotated[Number, Field(ge=0, le=1e6)]
 # Forms of the added mass, docs/model.md section 3.
 Hydrodynamics = Literal["consistent", "kelasidi2014"]
+# Which terms the drag has, ibidem.
+Drag = Literal["linear and quadratic", "quadratic"]
 
 
 @validated

@@ -43,7 +43,7 @@ class Simulation:
     """`size` copies of a robot, each in a scenario of its own, advanced in step.
 
     All scenarios must be of the same robot, and agree in what the numbers of physics steps follow
-    from: control period, physics step, integrator and hydrodynamics.
+    from: control period, physics step, integrator, hydrodynamics and drag.
 
     Attributes:
         world: The world that all robots are in.
@@ -128,7 +128,7 @@ class Simulation:
             scenario.conditions.timing == self._timing,
             "conditions",
             scenario.conditions.timing,
-            f"control period, physics step, integrator and hydrodynamics as the others: "
+            "control period, physics step, integrator, hydrodynamics and drag as the others: "
             f"{self._timing}",
         )
 

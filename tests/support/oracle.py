@@ -76,6 +76,7 @@ def accelerations(
     thruster_forces: ArrayLike,
     current: ArrayLike = (0.0, 0.0),
     hydrodynamics: str = "consistent",
+    drag: str = "linear and quadratic",
 ) -> tuple[Array, Array]:
     """Return (theta_ddot, p_ddot) by a dense solve of M q_ddot = projected forces."""
     body = links(robot, theta)
@@ -84,10 +85,15 @@ def accelerations(
     v_t = np.einsum("ic,ic->i", body.t, V)
     v_n = np.einsum("ic,ic->i", body.n, V)
 
-    F_t = -robot.tangential_drag * (v_t + v_t * np.abs(v_t))
-    F_n = -robot.normal_drag * (v_n + v_n * np.abs(v_n))
-    N = -robot.linear_yaw_drag * theta_dot
-    N -= robot.quadratic_yaw_drag * theta_dot * np.abs(theta_dot)
+    F_t = -robot.tangential_drag * v_t * np.abs(v_t)
+    F_n = -robot.normal_drag * v_n * np.abs(v_n)
+    N = -robot.quadratic_yaw_drag * theta_dot * np.abs(theta_dot)
+    if drag == "linear and quadratic":
+        F_t -= robot.tangential_drag * v_t
+        F_n -= robot.normal_drag * v_n
+        N -= robot.linear_yaw_drag * theta_dot
+    elif drag != "quadratic":
+        raise ValueError(f"unknown drag {drag!r}")
     if hydrodynamics == "consistent":
         F_t += mu * v_n * theta_dot
         F_n += mu * v_t * theta_dot

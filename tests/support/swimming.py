@@ -78,14 +78,14 @@ def relative_difference(actual: tuple[Array, Array], expected: tuple[Array, Arra
     )
 
 
-def swim(robot: Robot, state: State, duration: float, hydrodynamics: str = "consistent") -> Motion:
+def swim(robot: Robot, state: State, duration: float, **forms: str) -> Motion:
     """Integrate the plant under constant inputs, so closely that only its own errors show."""
     n = robot.links
 
     def derivative(_: float, y: Array) -> Array:
         theta, theta_dot, p_dot = y[:n], y[n + 2 : -2], y[-2:]
         theta_ddot, p_ddot = usm_gym.accelerations(
-            robot, theta, theta_dot, p_dot, *state[3:], hydrodynamics=hydrodynamics
+            robot, theta, theta_dot, p_dot, *state[3:], **forms
         )
         return np.concatenate([theta_dot, p_dot, theta_ddot, p_ddot])
 

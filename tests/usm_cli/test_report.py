@@ -280,6 +280,7 @@ def test_a_reproduction_has_a_page():
         settle_time=5.0,
         rows=PAPER,
         thrust_effort={},
+        peak_joint_torque={},
         paper=PAPER,
         scenario=declaration(),
         provenance=Provenance.here({}),
@@ -287,7 +288,7 @@ def test_a_reproduction_has_a_page():
     done = []
     choice = chapters.Choice()
     made = chapters.chapter(result, choice, lambda *numbers: done.append(numbers))
-    assert done[-1] == (5, 5)
+    assert done[-1] == (6, 6)
     replay = made.blocks[1]
     assert set(replay.data["episodes"]) >= {"sta", "pd"}
     assert "ratio 1.00" in page.html([made], provenance({}))

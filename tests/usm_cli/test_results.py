@@ -62,6 +62,7 @@ def reproduction():
         settle_time=5.0,
         rows=PAPER,
         thrust_effort={"sta": {"operation": 1.5}},
+        peak_joint_torque={"sta": {"operation": 2.5}},
         paper=PAPER,
         scenario=declaration(),
         provenance=PROVENANCE,
@@ -71,7 +72,11 @@ def reproduction():
 def sensitivity():
     axes = {"x": 1e-3, "y": 2e-3}
     outcome = Outcome(
-        errors={"torpedo": axes}, thrust_effort=1.0, peak_force=2.0, sigma={"first": axes}
+        errors={"torpedo": axes},
+        thrust_effort=1.0,
+        peak_force=2.0,
+        peak_joint_torque=3.0,
+        sigma={"first": axes},
     )
     lost, kept = map(planned_result, trials()[:2])
     runs = (lost, type(kept)(**{**vars(kept), "result": outcome}))

@@ -73,6 +73,7 @@ def test_thrusters_of_one_link_add_up():
             r"^the leading axes are {'p_dot': \(3,\), 'theta': \(4,\)}; allowed",
         ),
         ({"hydrodynamics": "none"}, "^hydrodynamics is 'none'"),
+        ({"drag": "none"}, "^drag is 'none'"),
     ],
 )
 def test_bad_arguments_are_refused_in_one_line(changes, message):

@@ -1,4 +1,4 @@
-"""`usm reproduce`: regenerate the paper's Table 1 and figures, and study its open items."""
+"""`usm reproduce`: run the paper's Table 1 and figures anew, and study its open items."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from rich.table import Table
 from usm_baselines.paper.reproduction import (
     AXES,
     PARTS,
+    PRINTED,
     SAMPLE_TIME,
     STEP,
     ReproductionResult,
@@ -56,7 +57,7 @@ def add_to(subparsers: Any) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "reproduce",
-        help="regenerate the paper's Table 1 and figures",
+        help="run the paper's Table 1 and figures anew",
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
@@ -158,31 +159,40 @@ def check_step(step: float) -> None:
     )
 
 
+def headings(result: ReproductionResult, between: str) -> list[str]:
+    """The headings of the columns of `lines` but for the first."""
+    return [*(f"{part}{between}{axis}" for part, axis in columns(result)), f"joints,{between}N m"]
+
+
 def columns(result: ReproductionResult) -> list[tuple[str, str]]:
     """The columns of the table, as pairs of part and axis."""
     return [(part, axis) for part in PARTS for axis in result.axes]
 
 
 def lines(result: ReproductionResult) -> list[list[str]]:
-    """Our rows, the paper's and their ratio, mm, as text."""
+    """Our rows, the paper's and their ratio, mm, and our largest joint torque, N m, as text."""
     places = columns(result)
     listed = []
     for name, row in result.rows.items():
-        listed.append([f"{name}, ours", *(mm(row[part][axis]) for part, axis in places)])
+        torque = figures(result.peak_joint_torque[name]["operation"])
+        listed.append([f"{name}, ours", *(mm(row[part][axis]) for part, axis in places), torque])
         if name in result.paper:
-            printed = result.paper[name]
-            theirs = [mm(printed[part][axis]) for part, axis in places]
-            ratio = [figures(row[part][axis] / printed[part][axis]) for part, axis in places]
-            listed += [[f"{name}, paper", *theirs], ["ratio", *ratio]]
+            theirs = [mm(result.paper[name][part][axis]) for part, axis in places]
+            listed.append([f"{name}, paper", *theirs, ""])
+        if printed := result.printed(name):
+            ratios = [figures(row[part][axis] / printed[part][axis]) for part, axis in places]
+            title = "ratio" if name in result.paper else f"ratio to {PRINTED[name]}, paper"
+            listed.append([title, *ratios, ""])
     return listed
 
 
 def terminal_table(result: ReproductionResult) -> Table:
     """Table 1 for the terminal."""
     shown = empty_table(
-        "mm",
-        numbers=(f"{part}\n{axis}" for part, axis in columns(result)),
-        title="absolute maximum of the position error after settling",
+        "",
+        numbers=headings(result, "\n"),
+        title="absolute maximum of the position error after settling, mm, and of the joint torques "
+        "in operation mode",
     )
     for line in lines(result):
         shown.add_row(*line)
@@ -212,9 +222,12 @@ def fit_table(result: FitResult) -> Table:
 
 def markdown(result: ReproductionResult) -> str:
     """The table as Markdown."""
-    places = columns(result)
-    head = "| mm | " + " | ".join(f"{part} {axis}" for part, axis in places) + " |"
-    rule = "|---|" + "---|" * len(places)
+    numbers = headings(result, " ")
+    head = "| | " + " | ".join(numbers) + " |"
+    rule = "|---|" + "---|" * len(numbers)
     body = ["| " + " | ".join(line) + " |" for line in lines(result)]
-    title = "Absolute maximum of the position error after settling (Table 1 of the paper).\n"
+    title = (
+        "Absolute maximum of the position error after settling, mm (Table 1 of the paper), and of "
+        "the joint torques in operation mode.\n"
+    )
     return "\n".join([title, head, rule, *body]) + "\n"

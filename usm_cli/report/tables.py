@@ -127,8 +127,8 @@ def paper_table(result: ReproductionResult) -> SortableTable:
         cells = [Cell(name, name)]
         for part, axis in places:
             ours, detail = row[part][axis], ""
-            if name in result.paper:
-                printed = result.paper[name][part][axis]
+            if errors := result.printed(name):
+                printed = errors[part][axis]
                 detail = f"paper {mm(printed)}, ratio {figures(ours / printed)}"
             cells.append(Cell(mm(ours), ours, detail))
         body.append(cells)

@@ -32,6 +32,7 @@ class Plant(NamedTuple):
         J: Moment of inertia of a link about its centre, kg m^2.
         lead: How far into a step forces are taken, s: half of it, or 0 for Euler's forward method.
         kirchhoff: 1.0 for the consistent added mass, 0.0 for that of Kelasidi et al. (2014).
+        linear_drag: 1.0 for drag with its linear terms, 0.0 for quadratic drag alone.
         links: Number of links.
         thruster_links: Zero-based link of each thruster, int64.
         thruster_is_normal: Whether each thruster pushes across its link.
@@ -46,6 +47,7 @@ class Plant(NamedTuple):
     J: float
     lead: float
     kirchhoff: float
+    linear_drag: float
     links: int
     thruster_links: NDArray[np.int64]
     thruster_is_normal: NDArray[np.bool_]
@@ -98,29 +100,32 @@ def kinematics(block, like, wide, stride, plant):
 
 
 @piece
-def fluid_force(v_t, v_n, omega, water_t, coefficients, kirchhoff):
+def fluid_force(v_t, v_n, omega, water_t, coefficients, kirchhoff, linear):
     """Force along and across a link and moment on it from the water, without -mu_n (n . a).
 
     Arguments are the link's velocity relative to the water, its rate, and the water's own velocity
-    along the link. The added mass of Kelasidi et al. (2014) leaves out the Munk moment
-    (docs/model.md section 3).
+    along the link; `linear` is `Plant.linear_drag`. The added mass of Kelasidi et al. (2014) leaves
+    out the Munk moment (docs/model.md section 3).
     """
     c_t, c_n, mu, _, lambda_2, lambda_3 = coefficients
     consistent = mu * kirchhoff
     published = mu - consistent
-    f_t = consistent * (v_n * omega) - c_t * (v_t + v_t * abs(v_t))
-    f_n = (consistent * v_t - published * water_t) * omega - c_n * (v_n + v_n * abs(v_n))
-    moment = -(lambda_2 + lambda_3 * abs(omega)) * omega - consistent * (v_t * v_n)
+    drag_t = c_t * (linear * v_t + v_t * abs(v_t))
+    drag_n = c_n * (linear * v_n + v_n * abs(v_n))
+    drag_yaw = (linear * lambda_2 + lambda_3 * abs(omega)) * omega
+    f_t = consistent * (v_n * omega) - drag_t
+    f_n = (consistent * v_t - published * water_t) * omega - drag_n
+    moment = -drag_yaw - consistent * (v_t * v_n)
     return f_t, f_n, moment
 
 
 @piece
-def damping(v_t, v_n, omega, coefficients):
+def damping(v_t, v_n, omega, coefficients, linear):
     """How drag grows with the velocity along and across a link and with its rate."""
     c_t, c_n, _, _, lambda_2, lambda_3 = coefficients
-    along = c_t * (1.0 + 2.0 * abs(v_t))
-    across = c_n * (1.0 + 2.0 * abs(v_n))
-    return along, across, lambda_2 + 2.0 * lambda_3 * abs(omega)
+    along = c_t * (linear + 2.0 * abs(v_t))
+    across = c_n * (linear + 2.0 * abs(v_n))
+    return along, across, linear * lambda_2 + 2.0 * lambda_3 * abs(omega)
 
 
 @piece
@@ -154,8 +159,10 @@ def own_answers(block, like, wide, stride, links, base, plant):
         v_t = c * u_x + s * u_y
         v_n = c * u_y - s * u_x
         water_t = c * water_x + s * water_y
-        f_t, f_n, moment = fluid_force(v_t, v_n, omega, water_t, coefficients, plant.kirchhoff)
-        d_t, d_n, d_yaw = damping(v_t, v_n, omega, coefficients)
+        f_t, f_n, moment = fluid_force(
+            v_t, v_n, omega, water_t, coefficients, plant.kirchhoff, plant.linear_drag
+        )
+        d_t, d_n, d_yaw = damping(v_t, v_n, omega, coefficients, plant.linear_drag)
         d_t, d_n, d_yaw = plant.lead * d_t, plant.lead * d_n, plant.lead * d_yaw
         a_x = load(block, row_of(LINK_AX, links) + i, wide)
         a_y = load(block, row_of(LINK_AY, links) + i, wide)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, TypeAdapter
 
-from usm_gym.robot import Hydrodynamics
+from usm_gym.robot import Drag, Hydrodynamics
 from usm_gym.support.validation import Number, Switch, build, require, validated
 
 # No water that a robot swims in moves faster, m/s.
@@ -34,7 +34,9 @@ class Conditions:
         integrator: "midpoint" is of second order and treats drag and joint controllers implicitly;
             "explicit" is Euler's forward method, stable with the default joint gains only below
             about 1e-4 s.
-        hydrodynamics: "consistent" or "kelasidi2014", see docs/model.md section 3.
+        hydrodynamics: Added mass, "consistent" or "kelasidi2014", see docs/model.md section 3.
+        drag: "linear and quadratic", as published, or "quadratic" alone, ibidem. No control law is
+            told.
         thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
         thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
         position_noise: Standard deviation of the position measurement, per axis, 0 to 1 m.
@@ -52,6 +54,7 @@ class Conditions:
     physics_step: Annotated[Number, Field(ge=1e-6, le=0.1)] = 1e-3
     integrator: Literal["midpoint", "explicit"] = "midpoint"
     hydrodynamics: Hydrodynamics = "consistent"
+    drag: Drag = "linear and quadratic"
     thruster_time_constant: Annotated[Number, Field(ge=0, le=100)] = 0.05
     thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0
     position_noise: Annotated[Number, Field(ge=0, le=1)] = 5e-5
@@ -79,9 +82,10 @@ class Conditions:
             require(low <= high, name, (low, high), "low <= high")
 
     @property
-    def timing(self) -> tuple[float, float, str, str]:
+    def timing(self) -> tuple[float, float, str, str, str]:
         """What robots that are simulated side by side have to agree in."""
-        return self.control_period, self.physics_step, self.integrator, self.hydrodynamics
+        step = self.control_period, self.physics_step
+        return *step, self.integrator, self.hydrodynamics, self.drag
 
     @property
     def substeps(self) -> int:

@@ -66,6 +66,7 @@ class Record(NamedTuple):
         disturbance: Acceleration less that by the force, f(t) / m_t of (23), m/s^2, (samples, 2).
         effort: Mean absolute command of the thrusters, N, (samples,).
         theta: Link angles, rad, (samples, links).
+        joint_torque: Largest torque of a joint from a sample to the next, N m, (samples,).
     """
 
     time: Array
@@ -77,6 +78,7 @@ class Record(NamedTuple):
     disturbance: Array
     effort: Array
     theta: Array
+    joint_torque: Array
 
 
 def record_for(samples: int, links: int) -> Record:
@@ -92,6 +94,7 @@ def record_for(samples: int, links: int) -> Record:
         disturbance=pairs[5],
         effort=np.empty(samples),
         theta=np.empty((samples, links)),
+        joint_torque=np.zeros(samples),
     )
 
 
@@ -179,6 +182,17 @@ def write_down(record, n, t, reference, error, force, commands, theta, surface, 
         record.observer_error[n, axis] = error[axis] - state[axis, 0]
 
 
+@piece
+def largest_torque(row, links):
+    """Largest torque of a joint in the physics step just made, N m, taken where forces are."""
+    torque, alpha = row_of(TORQUE, links), row_of(ALPHA, links)
+    largest = 0.0
+    for i in range(links - 1):
+        implicit = row[JOINT_INERTIA] * (row[alpha + i] - row[alpha + i + 1])
+        largest = max(largest, abs(row[torque + i] - implicit))
+    return largest
+
+
 @compiled
 def closed_loop(blocks, plant, mass, law, noise, every, record):
     """Plant, observer, control law and allocation, step by step; fills in the record.
@@ -234,6 +248,8 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
                 record, step // every, t, position, error, force, commands, theta, surface, state
             )
         physics_step(block, 0.0, wide, WIDTH, plant, base)
+        n = step // every
+        record.joint_torque[n] = max(record.joint_torque[n], largest_torque(row, links))
         if step % every == 0:
             for axis in range(error.size):
-                record.disturbance[step // every, axis] = row[A_X + axis] - force[axis] / mass
+                record.disturbance[n, axis] = row[A_X + axis] - force[axis] / mass

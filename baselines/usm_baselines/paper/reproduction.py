@@ -58,6 +58,8 @@ PAPER: Errors = {
         "settled": {"x": 0.0032, "y": 0.0073},
     },
 }
+# The paper's row that a row of ours is compared with.
+PRINTED = {"sta": "sta", "sta-measured": "sta", "pd": "pd"}
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ class ReproductionResult(Result):
         settle_time: From when on errors count, s.
         rows: Our errors by row, part and axis, m.
         thrust_effort: Mean thrust by row and mode, N.
+        peak_joint_torque: Largest torque of a joint by row and mode, N m.
         paper: The paper's errors, m.
         scenario: What is declared.
         provenance: Where all this comes from.
@@ -114,6 +117,7 @@ class ReproductionResult(Result):
     settle_time: Number
     rows: Errors
     thrust_effort: Mapping[str, Mapping[str, Number]]
+    peak_joint_torque: Mapping[str, Mapping[str, Number]]
     paper: Errors
     scenario: Declaration
     provenance: Provenance
@@ -135,6 +139,10 @@ class ReproductionResult(Result):
         """The axes of the table."""
         row = next(iter(self.rows.values()))
         return tuple(next(iter(row.values()), ()))
+
+    def printed(self, row: str) -> Mapping[str, Mapping[str, Number]] | None:
+        """The paper's errors, by part and axis, m, that a row of ours is compared with."""
+        return self.paper.get(PRINTED.get(row, row))
 
 
 def declaration() -> Declaration:
@@ -185,6 +193,7 @@ def cases(step: float = STEP) -> list[Case]:
         law = laws(scenario)
         fine, coarse = at_step(scenario, step), at_step(scenario, IMPLICIT_STEP)
         listed.append(Case("sta", mode, law["sta"], fine))
+        listed.append(Case("sta-measured", mode, law["sta"]._replace(measured=True), fine))
         for name, reading in (("pd", FORCE), ("pd-mass", MASS), ("pd-observer", OBSERVER)):
             listed.append(Case(name, mode, law["pd"]._replace(reading=reading), fine))
         listed.append(Case("sta-implicit", mode, law["sta"]._replace(implicit=True), coarse))
@@ -227,16 +236,19 @@ def reproduction(
     """Table 1 from the records of all cases at a step, s."""
     rows: dict[str, dict[str, dict[str, float]]] = {}
     effort: dict[str, dict[str, float]] = {}
+    torque: dict[str, dict[str, float]] = {}
     for case in cases(step):
         record = records[case.row, case.mode]
         rows.setdefault(case.row, {}).update(errors_of(case, record))
         late = record.time >= case.scenario.settle_time
         effort.setdefault(case.row, {})[case.mode] = float(record.effort[late].mean())
+        torque.setdefault(case.row, {})[case.mode] = float(record.joint_torque.max())
     return ReproductionResult(
         step=step,
         settle_time=named("table1", "operation").settle_time,
         rows=rows,
         thrust_effort=effort,
+        peak_joint_torque=torque,
         paper=PAPER,
         scenario=declaration(),
         provenance=provenance,

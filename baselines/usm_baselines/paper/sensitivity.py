@@ -118,12 +118,14 @@ class Outcome:
         errors: Largest errors by part of the table and axis, m.
         thrust_effort: Mean thrust after settling, N.
         peak_force: Largest force on the centre of mass after settling, N.
+        peak_joint_torque: Largest torque of a joint, N m.
         sigma: Largest |sigma| in the "first" and in the "last" second, by axis, m/s.
     """
 
     errors: Mapping[str, Mapping[str, Number]]
     thrust_effort: Number
     peak_force: Number
+    peak_joint_torque: Number
     sigma: Mapping[str, Mapping[str, Number]]
 
 
@@ -177,6 +179,12 @@ class SensitivityResult(Result):
         return tuple(next(iter(outcomes[0].errors.values()))) if outcomes else ()
 
 
+# Joint gains and filter of the scenario "nominal".
+OF_THE_BENCHMARK = Variation(
+    joints={"joint_stiffness": None, "joint_damping": None}, inspection={"filter_frequency": 8.0}
+)
+
+
 def variations() -> dict[str, dict[str, Variation]]:
     """The open items, and what takes their place; the first is the declaration itself."""
     water = named("table1", "operation").water
@@ -208,6 +216,7 @@ def variations() -> dict[str, dict[str, Variation]]:
         "water": {
             "kelasidi2014": Variation(conditions={"hydrodynamics": "kelasidi2014"}),
             "half the normal drag": Variation(scenario={"water": normal_drag}),
+            "quadratic drag": Variation(conditions={"drag": "quadratic"}),
         },
         # With the row of (4) as printed a moment M makes the forces of the moment M l.
         "moment row": {"as printed": Variation(heading_gain_factor=Robot().half_length)},
@@ -218,8 +227,15 @@ def variations() -> dict[str, dict[str, Variation]]:
         },
         "joint gains": {
             f"{k_p:g}, {k_d:g}": Variation(joints={"joint_stiffness": k_p, "joint_damping": k_d})
-            for k_p, k_d in ((90000.0, 1500.0), (30000.0, 150.0), (900.0, 15.0), (20.0, 5.0))
+            for k_p, k_d in (
+                (90000.0, 1500.0),
+                (30000.0, 150.0),
+                (900.0, 15.0),
+                (280.0, 4.7),
+                (20.0, 5.0),
+            )
         },
+        "joints": {"of the benchmark": OF_THE_BENCHMARK},
         "noise": {
             f"{1e3 * noise:g} mm": Variation(conditions={"position_noise": noise})
             for noise in (1e-5, 5e-5)
@@ -343,6 +359,7 @@ def outcome(case: Case) -> Outcome | None:
         errors=errors_of(case, record),
         thrust_effort=float(record.effort[late].mean()),
         peak_force=float(np.abs(record.force[late]).max()),
+        peak_joint_torque=float(record.joint_torque.max()),
         sigma={
             "first": by_axis(size[first].max(axis=0)),
             "last": by_axis(size[last].max(axis=0)),

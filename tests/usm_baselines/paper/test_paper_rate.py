@@ -73,6 +73,27 @@ def test_the_disturbance_is_what_the_force_does_not_explain():
     assert np.abs(record.disturbance[record.time > 10.0]).max() > 1.0
 
 
+def test_the_joint_torque_is_what_the_controllers_make_of_the_angles():
+    """At a step at which the joints, with a corner at 60 rad/s, are well resolved."""
+    h, table1 = 1e-4, at_step(named("table1", "operation"), 1e-4)
+    motion = dataclasses.replace(table1.inspection, times=(0.3, 0.6), deflections=(0.98, -0.98))
+    scenario = dataclasses.replace(table1, inspection=motion, duration=0.9, settle_time=0.1)
+    record = simulate(scenario, Law(), every=1)
+    joints = -np.diff(record.theta, axis=1)
+    asked = np.where(record.time < 0.6 - h / 2, 0.98, -0.98) * (record.time > 0.3 - h / 2)
+    bends = np.arange(joints.shape[1]) >= joints.shape[1] - motion.bending_joints
+    errors = asked[:, None] * bends / motion.bending_joints - joints
+    torque = 9000.0 * errors - 150.0 * np.gradient(joints, h, axis=0)
+    peak = np.abs(torque).max(axis=1)
+    smooth = np.ones(record.time.size, bool)  # but for the jumps, which differences blur
+    for jump in motion.times:
+        smooth &= np.abs(record.time - jump) > 1e-3
+    np.testing.assert_allclose(record.joint_torque[smooth], peak[smooth], atol=0.01 * peak.max())
+    assert record.joint_torque.max() == pytest.approx(peak.max(), rel=0.02)
+    coarse = simulate(scenario, Law(), every=100)
+    assert (coarse.joint_torque == record.joint_torque.reshape(-1, 100).max(axis=1)).all()
+
+
 def test_a_period_that_is_too_long_loses_the_robot_and_is_refused():
     scenario = at_step(named("table1", "operation"), 0.1)
     with pytest.raises(ValueError, match="not lost"):

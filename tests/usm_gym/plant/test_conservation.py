@@ -59,5 +59,7 @@ def test_the_published_form_makes_energy_from_nothing() -> None:
     robot = without_drag(swimmer(16))
     state = random_state(robot, np.random.default_rng(0)).coasting()
     still = state._replace(current=np.zeros(2))
-    energy = energies(robot, swim(robot, still, DURATION, "kelasidi2014"), still.current)
+    energy = energies(
+        robot, swim(robot, still, DURATION, hydrodynamics="kelasidi2014"), still.current
+    )
     assert np.max(energy) > 1.01 * energy[0]

@@ -14,6 +14,7 @@ def test_presets_are_those_of_the_documentation() -> None:
         "physics_step": 1e-3,
         "integrator": "midpoint",
         "hydrodynamics": "consistent",
+        "drag": "linear and quadratic",
         "position_delay": 0,
         "action_delay": 0,
         "motion": True,

@@ -52,6 +52,7 @@ def everything() -> list[Scenario]:
                 physics_step=5e-5,
                 integrator="explicit",
                 hydrodynamics="kelasidi2014",
+                drag="quadratic",
                 motion=False,
             ),
             duration=3.0,
