@@ -31,10 +31,12 @@ class Range:
         require(self.low < self.high, "high", self.high, f"a number > low = {self.low}")
         require(self.low > 0 or not self.log, "low", self.low, "a number > 0 on a log scale")
 
-    @property
-    def middle(self) -> float:
-        """The middle, on the scale of the range."""
-        return math.sqrt(self.low * self.high) if self.log else 0.5 * (self.low + self.high)
+    def at(self, place: float) -> float:
+        """The value that lies at a place."""
+        if not self.log:
+            return self.low + place * (self.high - self.low)
+        value = self.low * (self.high / self.low) ** place
+        return min(max(value, self.low), self.high)
 
     def place(self, value: float) -> float:
         """Where a value lies, on the scale of the range: 0 at its low end, 1 at its high end."""

@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> None:
             "gains": result.gains,
             "objective": result.objective,
             "validation": {"own_gains": result.start, "these": result.validation},
-            "budget": {**asdict(problem.budget), "pruned": result.pruned},
+            "budget": asdict(problem.budget),
             "weight": problem.weight,
             "mode": problem.mode,
             "conditions": asdict(problem.conditions),

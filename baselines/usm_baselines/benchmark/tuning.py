@@ -1,11 +1,15 @@
-"""Tuning of gains by Optuna, on sampled training scenarios only.
+"""Tuning of gains by CMA-ES, on sampled training scenarios only.
 
 The scenarios come from the stream TUNING of a seed, and the check afterwards from the stream
 VALIDATION; nothing here can reach a frozen suite. In some of them the vehicle reacts later than
 the policy is told, so that no gains are chosen that live on the margin of stability. Every search
-starts from the middle of its ranges, whatever gains the policy has of its own. Trials are asked
-for in rounds of a fixed size and the sampler is seeded anew for every round, so that the result is
-the same for any number of workers and for a tuning that was interrupted.
+starts from the middle of its ranges, whatever gains the policy has of its own.
+
+Optuna keeps the trials. What the search asks for next follows from all trials before and from
+nothing else, so that the result is the same for any number of workers and for a tuning that was
+interrupted.
+
+Source: N. Hansen, The CMA evolution strategy: a tutorial, arXiv:1604.00772, 2016.
 """
 
 from __future__ import annotations
@@ -19,10 +23,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import optuna
+from cmaes import CMA
 from optuna import Study
 from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.exceptions import StorageInternalError
-from optuna.trial import FrozenTrial, TrialState
+from optuna.trial import FrozenTrial, create_trial
 from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
@@ -31,7 +36,7 @@ from usm_baselines.contender import registered
 from usm_baselines.gains import Budget, GainsFile
 from usm_baselines.registry import entry, tuned
 from usm_baselines.space import Space
-from usm_gym.evaluation import Evaluation, joined
+from usm_gym.evaluation import Evaluation
 from usm_gym.support import parallel
 from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
@@ -42,21 +47,18 @@ from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
-# Trials asked for at once, from what is known before all of them.
-ROUND = 4
+# Trials of a generation, and the first standard deviation of the search over the width of a range.
+GENERATION, SPREAD = 8, 0.2
 # In every so many-th scenario commands take effect a period late and thrusters lag more, by a
 # factor; the policy is not told.
 MARGIN_EVERY, MARGIN_DELAY, MARGIN_LAG = 8, 1, 1.3
 # Objective of a trial that has no score, mm.
 FAILED = 1e4
-# Trials that are drawn at random, and never pruned, before the sampler and the pruner set in.
-STARTUP_TRIALS = 16
 # Objectives that are this close to the best are as good; of these trials the one is taken whose
 # gains are nearest to the middle of their ranges.
 AS_GOOD = 0.01
-# Attributes of a trial: its objective, or None if it was given up early; and why it has no score.
-# The names stand in the storages of tunings that go on.
-OBJECTIVE, REFUSED = "found", "refused"
+# The attribute of a trial that says why it has no score.
+REFUSED = "refused"
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,7 @@ class Problem:
         weight: Cost of thrust variation, mm per N/s.
         mode: "operation" or "torpedo".
         conditions: Conditions of the sampled scenarios.
-        seed: Seed of scenarios and sampler.
-        first_episodes: Episodes after which a trial may be given up.
+        seed: Seed of scenarios and search.
     """
 
     policy: str
@@ -79,7 +80,6 @@ class Problem:
     mode: Mode = "operation"
     conditions: Conditions = FIELD
     seed: int = 0
-    first_episodes: int = 16
 
     def __post_init__(self) -> None:
         """Refuse a policy without a space, and numbers that make no sense."""
@@ -88,7 +88,6 @@ class Problem:
         require(self.budget.episodes >= 1, "episodes", self.budget.episodes, "1 or more")
         require(0 <= self.weight <= 1000, "weight", self.weight, "0 to 1000")
         require(self.seed >= 0, "seed", self.seed, "0 or more")
-        require(self.first_episodes >= 1, "first_episodes", self.first_episodes, "1 or more")
 
     @property
     def space(self) -> Space:
@@ -133,14 +132,12 @@ class Optimum:
         objective: Their objective on the tuning scenarios, mm.
         start: That of the policy's own gains on the validation scenarios, mm.
         validation: That of the best gains on the validation scenarios, mm.
-        pruned: How many trials were given up early.
     """
 
     gains: dict[str, float]
     objective: float
     start: float
     validation: float
-    pruned: int
 
 
 def later(scenario: Scenario) -> Scenario:
@@ -172,9 +169,6 @@ def tune(
 ) -> Optimum:
     """Look for the gains with the smallest objective.
 
-    Every trial meets the first scenarios; only those that are no worse there than the median of the
-    trials before meet the others, too.
-
     Args:
         problem: What is tuned, and on what.
         storage: URL of Optuna's storage, in which an interrupted tuning is found again; without it,
@@ -191,19 +185,22 @@ def tune(
         BlockingIOError: If another process is at the same study in a file of SQLite.
     """
     with _usable(storage, StorageInternalError, SQLAlchemyError), _held(storage, problem.study):
-        study = _study(problem, storage)
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        with _usable(storage, Exception):  # of any database
+            study = optuna.create_study(
+                study_name=problem.study, storage=storage, load_if_exists=True
+            )
         _search(study, problem, workers, progress)
-        chosen = _chosen(study, problem.space)
-        best, value = dict(chosen.params), chosen.value or 0.0
+        chosen = _chosen(study, problem)
+        best, value = dict(chosen.params), value_of(chosen)
         reason = chosen.user_attrs.get(REFUSED)
-        pruned = len(study.get_trials(deepcopy=False, states=[TrialState.PRUNED]))
     if value >= FAILED:
         raise UsageError(f"no trial of {problem.policy} has a score: {reason}")
     checks = [problem.job(gains, VALIDATION) for gains in ({}, best)]
     start, validation = (
         objective(outcome, problem.weight) for outcome in score_all(checks, workers)
     )
-    return Optimum(best, value, start, validation, pruned)
+    return Optimum(best, value, start, validation)
 
 
 @contextmanager
@@ -228,103 +225,69 @@ def _held(storage: str | None, study: str) -> AbstractContextManager[None]:
     return holding(f"{url.database}-{study}")
 
 
-def _study(problem: Problem, storage: str | None) -> Study:
-    """The study of a problem, without a round that is half done."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    with _usable(storage, Exception):  # of any database
-        study = optuna.create_study(
-            study_name=problem.study,
-            storage=storage,
-            load_if_exists=True,
-            pruner=optuna.pruners.MedianPruner(n_startup_trials=STARTUP_TRIALS),
-        )
-    _tell(study)
-    return study
-
-
 def _search(
     study: Study, problem: Problem, workers: int, progress: Callable[[int, float], object]
 ) -> None:
-    """Carry out the rounds that are left."""
-    progress(_finished(study), study.best_value if _finished(study) else float("nan"))
-    while (done := _finished(study)) < problem.budget.trials:
-        study.sampler = optuna.samplers.TPESampler(
-            seed=int(stream(problem.seed, TUNING).integers(2**31)) + done,
-            n_startup_trials=STARTUP_TRIALS,
-            multivariate=True,
-            constant_liar=True,
-        )
-        if done == 0 and not study.get_trials(deepcopy=False, states=[TrialState.WAITING]):
-            middle = {name: span.middle for name, span in problem.space.items()}
-            study.enqueue_trial(middle)
-        _round(study, problem, min(ROUND, problem.budget.trials - done), workers)
-        progress(_finished(study), study.best_value)
-
-
-def _round(study: Study, problem: Problem, size: int, workers: int) -> None:
-    """Ask for trials, score them on the first scenarios, the better ones on all, and tell."""
-    space: dict[str, BaseDistribution] = {
-        name: FloatDistribution(span.low, span.high, log=span.log)
-        for name, span in problem.space.items()
+    """Carry out the trials that are left."""
+    space, trials = problem.space, problem.budget.trials
+    distributions: dict[str, BaseDistribution] = {
+        name: FloatDistribution(span.low, span.high, log=span.log) for name, span in space.items()
     }
-    trials = [study.ask(space) for _ in range(size)]
-    jobs = [problem.job(trial.params, TUNING) for trial in trials]
-    first = problem.first_episodes
-    begun = _scored(jobs, slice(first), workers)
-    for index, trial in enumerate(trials):
-        trial.report(objective(begun[index], problem.weight), 0)
-    going = [index for index, trial in enumerate(trials) if not trial.should_prune()]
-    outcomes = {index: begun[index] for index in going}
-    if problem.budget.episodes > first:
-        rest = _scored([jobs[index] for index in going], slice(first, None), workers)
-        outcomes = {index: _joined(begun[index], rest[k]) for k, index in enumerate(going)}
-    for index, trial in enumerate(trials):
-        outcome = outcomes.get(index)
-        if isinstance(outcome, Refusal):
-            trial.set_user_attr(REFUSED, outcome.reason)
-        trial.set_user_attr(OBJECTIVE, outcome and objective(outcome, problem.weight))
-    _tell(study)
+    values = [value_of(trial) for trial in study.get_trials(deepcopy=False)]
+    progress(len(values), min(values, default=float("nan")))
+    optimizer = CMA(
+        mean=np.full(len(space), 0.5),
+        sigma=SPREAD,
+        bounds=np.tile([0.0, 1.0], (len(space), 1)),
+        seed=int(stream(problem.seed, TUNING).integers(2**31)),
+        population_size=GENERATION,
+    )
+    for first in range(0, trials, GENERATION):
+        places = [optimizer.ask() for _ in range(GENERATION)]
+        # Of a tuning that goes on, trials are known; they only have to be told again.
+        asked = [
+            {name: span.at(place) for (name, span), place in zip(space.items(), each, strict=True)}
+            for each in places[len(values) - first : trials - first]
+        ]
+        for gains, outcome in zip(asked, _scored(problem, asked, workers), strict=True):
+            value = objective(outcome, problem.weight)
+            refusal = {REFUSED: outcome.reason} if isinstance(outcome, Refusal) else {}
+            study.add_trial(
+                create_trial(
+                    params=gains, distributions=distributions, value=value, user_attrs=refusal
+                )
+            )
+            values.append(value)
+        if asked:
+            progress(len(values), min(values))
+        told = values[first : first + GENERATION]
+        if len(told) == GENERATION:
+            optimizer.tell(list(zip(places, told, strict=True)))
 
 
-def _tell(study: Study) -> None:
-    """End the trials of a round, with their objectives, or as failed if one has none.
-
-    Every trial keeps its objective before the first of them ends. So a round during which a tuning
-    was killed counts as a whole or not at all, and what follows is the same.
-    """
-    trials = study.get_trials(deepcopy=False, states=[TrialState.RUNNING])
-    complete = all(OBJECTIVE in trial.user_attrs for trial in trials)
-    # Those without come last, so that a round that is not complete stays so until it is gone.
-    for trial in sorted(trials, key=lambda trial: OBJECTIVE not in trial.user_attrs):
-        if not complete:
-            study.tell(trial.number, state=TrialState.FAIL)
-        elif trial.user_attrs[OBJECTIVE] is None:
-            study.tell(trial.number, state=TrialState.PRUNED)
-        else:
-            study.tell(trial.number, trial.user_attrs[OBJECTIVE])
+def _scored(
+    problem: Problem, asked: Sequence[dict[str, float]], workers: int
+) -> list[Evaluation | Refusal]:
+    """What becomes of gains on the tuning scenarios."""
+    tasks = [(problem.job(gains, TUNING), slice(None)) for gains in asked]
+    outcomes = dict(parallel.results(score_batch, tasks, workers))
+    return [outcomes[index] for index in range(len(tasks))]
 
 
-def _scored(jobs: Sequence[Job], part: slice, workers: int) -> dict[int, Evaluation | Refusal]:
-    return dict(parallel.results(score_batch, [(job, part) for job in jobs], workers))
-
-
-def _joined(first: Evaluation | Refusal, second: Evaluation | Refusal) -> Evaluation | Refusal:
-    if isinstance(first, Refusal):
-        return first
-    return second if isinstance(second, Refusal) else joined([first, second])
-
-
-def _chosen(study: Study, space: Space) -> FrozenTrial:
+def _chosen(study: Study, problem: Problem) -> FrozenTrial:
     """The trial that is taken, of those that are as good as the best."""
-    limit = (1.0 + AS_GOOD) * study.best_value
-    trials = study.get_trials(deepcopy=False, states=[TrialState.COMPLETE])
+    trials = study.get_trials(deepcopy=False)[: problem.budget.trials]
+    limit = (1.0 + AS_GOOD) * min(map(value_of, trials))
 
     def distance(trial: FrozenTrial) -> float:
-        return max(abs(span.place(trial.params[name]) - 0.5) for name, span in space.items())
+        spans = problem.space.items()
+        return max(abs(span.place(trial.params[name]) - 0.5) for name, span in spans)
 
-    return min((trial for trial in trials if (trial.value or 0.0) <= limit), key=distance)
+    return min((trial for trial in trials if value_of(trial) <= limit), key=distance)
 
 
-def _finished(study: Study) -> int:
-    """How many trials have been told."""
-    return len(study.get_trials(deepcopy=False, states=[TrialState.COMPLETE, TrialState.PRUNED]))
+def value_of(trial: FrozenTrial) -> float:
+    """The objective of a trial, mm."""
+    value = trial.value
+    assert value is not None  # none is kept without
+    return value
