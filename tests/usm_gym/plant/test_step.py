@@ -59,13 +59,21 @@ def test_one_step_agrees_with_the_dense_oracle(
         assert relative_error(dense_step.read(simulation), expected, before) < 1e-12
 
 
+@pytest.mark.parametrize("frequency", [8.0, None])
 @pytest.mark.parametrize(("integrator", "step"), [("midpoint", 1e-3), ("explicit", 5e-5)])
-def test_a_control_period_is_many_steps_under_one_command(integrator: str, step: float) -> None:
+def test_a_control_period_is_many_steps_under_one_command(
+    integrator: str, step: float, frequency: float | None
+) -> None:
+    # The second change of the joint references falls inside a step.
     robot = Robot()
     conditions = replace(ROUGH, control_period=40 * step, physics_step=step, integrator=integrator)
     scenario = replace(
         sample("operation", conditions, np.random.default_rng(0)),
-        inspection=Inspection(times=(60 * step, 150 * step), deflections=(1.2, -0.8)),
+        inspection=Inspection(
+            times=(60 * step, 150.3 * step),
+            deflections=(1.2, -0.8),
+            filter_frequency=frequency,
+        ),
     )
     simulation = Simulation([scenario])
     start = moment = dense_step.read(simulation)
@@ -145,12 +153,14 @@ def exact_bend() -> Array:
     return y[: n + 2]
 
 
-@pytest.mark.parametrize(("integrator", "step"), [("midpoint", 1e-3), ("explicit", 1e-4)])
-def test_the_integrator_converges_in_first_order(integrator: str, step: float) -> None:
+@pytest.mark.parametrize(
+    ("integrator", "step", "order"), [("midpoint", 1e-3, 2.0), ("explicit", 1e-4, 1.0)]
+)
+def test_the_integrator_converges(integrator: str, step: float, order: float) -> None:
     errors = [np.abs(bend(step / k, integrator) - exact_bend()).max() for k in (1, 2, 4)]
-    assert 0.0 < errors[0] < 0.01
+    assert 0.0 < errors[0] < 1e-3
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    np.testing.assert_allclose(orders, 1.0, atol=0.15)
+    np.testing.assert_allclose(orders, order, atol=0.1)
 
 
 @pytest.mark.parametrize("links", [2, 3, 10, 16])
@@ -209,14 +219,14 @@ def test_joint_references_follow_the_critically_damped_filter(
 
 def test_joint_references_without_a_filter_are_steps() -> None:
     inspection = Inspection(
-        bending_joints=4, times=(0.2, 0.5), deflections=(1.2, -0.8), filter_frequency=None
+        bending_joints=4, times=(0.2, 0.4996), deflections=(1.2, -0.8), filter_frequency=None
     )
     scenario = Scenario(conditions=IDEAL, inspection=inspection)
     for copies in (1, 2):
         simulation = Simulation([scenario] * copies)
         for k in range(1, 40):
             simulation.step(np.zeros((copies, 5), np.float32))
-            deflection = 0.0 if k <= 10 else 1.2 if k <= 25 else -0.8
+            deflection = 0.0 if k <= 10 else 1.2 if k < 25 else -0.8
             expected = np.zeros((3, 15))
             expected[0, 11:] = deflection / 4
             np.testing.assert_allclose(references_of(simulation), expected, atol=1e-7)
@@ -299,7 +309,7 @@ def run(scenarios: Sequence[Scenario], first: int = 0) -> list[Array]:
             simulation.attitude_error.copy(),
         ]
     moments = [dense_step.read(simulation, k) for k in range(size)]
-    return [*seen, np.stack([np.hstack(moment) for moment in moments])]
+    return [*seen, np.stack([dense_step.flat(moment) for moment in moments])]
 
 
 @cache
@@ -342,7 +352,7 @@ def test_the_lane_does_not_matter() -> None:
         simulation = Simulation([mixture()[19 - k]])
         for action in actions()[:, k : k + 1]:
             simulation.step(action)
-        assert same(turned[-1][k], np.hstack(dense_step.read(simulation)))
+        assert same(turned[-1][k], dense_step.flat(dense_step.read(simulation)))
 
 
 def test_the_mixture_is_one() -> None:
