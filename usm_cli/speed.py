@@ -18,7 +18,7 @@ import numpy as np
 from usm_baselines.paper.paper_rate import Law, simulate
 from usm_baselines.registry import make
 
-from usm_gym.evaluation import evaluate
+from usm_gym.evaluation import Trajectory, evaluate, rollout
 from usm_gym.robot import Robot, Thruster
 from usm_gym.simulation import Simulation
 from usm_gym.suites import suite
@@ -33,6 +33,9 @@ from usm_gym.task.scenario import Scenario
 ROBOTS = 256
 SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
 HERE = Track(speed=0.0, amplitude=0.0)
+# Physics steps that are priced, s; the last is what the others are compared with.
+STEPS = {"2ms": 2e-3, "1ms": 1e-3, "500us": 5e-4, "100us": 1e-4}
+LOOPS, LOOP_TIME = 8, 15.0
 FIRST_STEP = """
 import gymnasium, usm_gym
 env = gymnasium.make("usm_gym:USM-Operation-v0")
@@ -302,6 +305,33 @@ def thousand_episodes() -> None:
     """Score the super-twisting controller on a thousand sampled operation episodes of 40 s."""
     scenarios = [sample("operation", Conditions(), stream(1, EVALUATION, i)) for i in range(1000)]
     evaluate(make("sta", scenarios[0].nominal), scenarios)
+
+
+def closed_loops(step: float) -> list[Trajectory]:
+    """Run `lqg` through the beginnings of operation episodes, up to a motion of the joints."""
+    scenarios = [
+        replace(
+            scenario,
+            duration=LOOP_TIME,
+            conditions=replace(scenario.conditions, physics_step=step),
+        )
+        for scenario in suite("operation")[:LOOPS]
+    ]
+    return rollout(make("lqg", scenarios[0].nominal), scenarios)
+
+
+def loop_timing(name: str, step: float) -> Timing:
+    """Time closed loops at a physics step, per robot and simulated second, us."""
+    return Timing(name, lambda: closed_loops(step), LOOPS * LOOP_TIME, 1e6)
+
+
+def loop_errors() -> dict[str, float]:
+    """How far each step but the last of `STEPS` takes `lqg` from where the last does, nm."""
+    *positions, exact = (
+        np.stack([trajectory.error for trajectory in closed_loops(step)]) for step in STEPS.values()
+    )
+    errors = [1e9 * float(np.abs(position - exact).max()) for position in positions]
+    return dict(zip(STEPS, errors, strict=False))
 
 
 def timed(job: Callable[[], object]) -> float:
