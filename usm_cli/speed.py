@@ -25,7 +25,7 @@ from usm_gym.suites import suite
 from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import Count, Number, require, validated
-from usm_gym.task.conditions import Conditions
+from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import Path as Track
 from usm_gym.task.scenario import Scenario
@@ -160,14 +160,19 @@ def interleaved(
 
 
 def plant_timing(
-    name: str, size: int, period: float, threads: int = 1, robot: Robot | None = None
+    name: str,
+    size: int,
+    period: float,
+    threads: int = 1,
+    robot: Robot | None = None,
+    step: float = FIELD.physics_step,
 ) -> Timing:
     """Time physics steps of `size` robots, per robot and step, with moving joints.
 
     They have no thrust, so their reference rests; otherwise they would be lost.
     """
     body = robot or Robot()
-    conditions = Conditions(control_period=period, current_limit=0.0)
+    conditions = Conditions(control_period=period, physics_step=step, current_limit=0.0)
     simulation = Simulation(resting(size, conditions, body), threads)
     start = simulation.snapshot()
     action = np.zeros((size, len(body.thrusters)), np.float32)
@@ -178,6 +183,12 @@ def plant_timing(
         simulation.step(action)
 
     return Timing(name, run, size * conditions.substeps)
+
+
+def second_timing(name: str, step: float) -> Timing:
+    """Time simulated seconds of `ROBOTS` robots at a physics step, per robot; us."""
+    steps = plant_timing(name, ROBOTS, BATCH_PERIOD, step=step)
+    return replace(steps, units=ROBOTS * BATCH_PERIOD, scale=1e6)
 
 
 def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
@@ -318,11 +329,6 @@ def closed_loops(step: float) -> list[Trajectory]:
         for scenario in suite("operation")[:LOOPS]
     ]
     return rollout(make("lqg", scenarios[0].nominal), scenarios)
-
-
-def loop_timing(name: str, step: float) -> Timing:
-    """Time closed loops at a physics step, per robot and simulated second, us."""
-    return Timing(name, lambda: closed_loops(step), LOOPS * LOOP_TIME, 1e6)
 
 
 def loop_errors() -> dict[str, float]:
