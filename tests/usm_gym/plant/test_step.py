@@ -178,6 +178,33 @@ def test_robots_of_any_length_keep_still_and_stable(links: int) -> None:
     assert np.abs(simulation.read("position")[0]).max() < 0.5 * robot.link_length * links
 
 
+def fastest(links: int, step: float, gains: tuple[float, float]) -> float:
+    """Return the largest link rate, rad/s, under thrust and joint references that jump."""
+    robot = swimmer(links)
+    conditions = Conditions(control_period=0.02, physics_step=step, position_noise=0.0)
+    bends = Inspection(
+        bending_joints=links - 1, times=(1.0, 2.0), deflections=(1.5, -1.5), filter_frequency=None
+    )
+    scenario = Scenario(conditions=conditions, inspection=bends, duration=4.0, robot=robot)
+    simulation = Simulation([replace(scenario, joint_stiffness=gains[0], joint_damping=gains[1])])
+    rng, rates = np.random.default_rng(0), []
+    for _ in range(20):
+        action = rng.uniform(-1.0, 1.0, (1, len(robot.thrusters))).astype(np.float32)
+        for _ in range(10):
+            simulation.step(action)
+            rates.append(np.abs(simulation.read("theta_dot")).max())
+    return float(np.max(rates))  # not finite if any is
+
+
+@pytest.mark.parametrize("gains", [(20.0, 5.0), (9000.0, 150.0), (2e5, 5e3)])
+@pytest.mark.parametrize("links", [2, 3, 16, 17])
+def test_stiff_joints_are_stable_at_coarse_steps(links: int, gains: tuple[float, float]) -> None:
+    # Two links turn by half a radian in 20 ms, which no step with explicit angles survives.
+    for step in (5e-3, 1e-2, 2e-2)[: 2 if links == 2 else 3]:
+        # Control instants miss more of how the joints spring at a jump, the finer the step.
+        assert fastest(links, step, gains) < 3.0 * fastest(links, 1e-3, gains)
+
+
 def references_of(simulation: Simulation) -> Array:
     """Return joint references, their rates and accelerations now, (3, joints), in SI units."""
     names = ("joint_references", "joint_reference_rates", "joint_reference_accelerations")
