@@ -91,16 +91,24 @@ COMPETITORS = [id for id in ids() if not entry(id).privileged]
     ],
 )
 def test_the_default_step_changes_no_score(suite_name, id):
-    scenarios = suite(suite_name)[:8]
+    scenarios = suite(suite_name)
+    few = changes(id, scenarios[:8])
+    if not all(abs(change.mean()) <= bound for change, bound in few):
+        # Single episodes of a loop that oscillates by itself are chaotic: the whole suite decides.
+        for change, bound in changes(id, scenarios):
+            mean, (low, high) = mean_interval(change)
+            assert abs(mean) <= bound or low <= 0.0 <= high
+            assert high - low < 20.0 * bound  # else an interval that holds 0 shows nothing
+
+
+def changes(id, scenarios):
+    """By axis, what the default step changes of each score, mm, and the bound on its mean."""
     policy = make(id, scenarios[0].nominal)
     ours, fine = (
         evaluate(policy, at_step(scenarios, step)).per_episode for step in (DEFAULT, FINE)
     )
-    for axis in "xy":
-        exact, ours_here = (1e3 * scores[f"max_error_{axis}"] for scores in (fine, ours))
-        mean, (low, high) = mean_interval(ours_here - exact)
-        if abs(mean) > max(0.02 * exact.mean(), 0.01):
-            # In a loop that oscillates by itself, single episodes are chaotic. Their differences
-            # must be about zero, and few enough to show it.
-            assert low <= 0.0 <= high
-            assert high - low < 0.4 * exact.mean()
+    found = []
+    for name in ("max_error_x", "max_error_y"):
+        exact = 1e3 * fine[name]
+        found.append((1e3 * ours[name] - exact, max(0.02 * exact.mean(), 0.01)))
+    return found
