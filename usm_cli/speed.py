@@ -18,14 +18,14 @@ import numpy as np
 from usm_baselines.paper.paper_rate import Law, simulate
 from usm_baselines.registry import make
 
-from usm_gym.evaluation import evaluate
+from usm_gym.evaluation import Trajectory, evaluate, rollout
 from usm_gym.robot import Robot, Thruster
 from usm_gym.simulation import Simulation
 from usm_gym.suites import suite
 from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import Count, Number, require, validated
-from usm_gym.task.conditions import Conditions
+from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import Path as Track
 from usm_gym.task.scenario import Scenario
@@ -33,6 +33,9 @@ from usm_gym.task.scenario import Scenario
 ROBOTS = 256
 SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
 HERE = Track(speed=0.0, amplitude=0.0)
+# Physics steps that are priced, s; the last is what the others are compared with.
+STEPS = {"2ms": 2e-3, "1ms": 1e-3, "500us": 5e-4, "100us": 1e-4}
+LOOPS, LOOP_TIME = 8, 15.0
 FIRST_STEP = """
 import gymnasium, usm_gym
 env = gymnasium.make("usm_gym:USM-Operation-v0")
@@ -157,14 +160,19 @@ def interleaved(
 
 
 def plant_timing(
-    name: str, size: int, period: float, threads: int = 1, robot: Robot | None = None
+    name: str,
+    size: int,
+    period: float,
+    threads: int = 1,
+    robot: Robot | None = None,
+    step: float = FIELD.physics_step,
 ) -> Timing:
     """Time physics steps of `size` robots, per robot and step, with moving joints.
 
     They have no thrust, so their reference rests; otherwise they would be lost.
     """
     body = robot or Robot()
-    conditions = Conditions(control_period=period, current_limit=0.0)
+    conditions = Conditions(control_period=period, physics_step=step, current_limit=0.0)
     simulation = Simulation(resting(size, conditions, body), threads)
     start = simulation.snapshot()
     action = np.zeros((size, len(body.thrusters)), np.float32)
@@ -175,6 +183,12 @@ def plant_timing(
         simulation.step(action)
 
     return Timing(name, run, size * conditions.substeps)
+
+
+def second_timing(name: str, step: float) -> Timing:
+    """Time simulated seconds of `ROBOTS` robots at a physics step, per robot; us."""
+    steps = plant_timing(name, ROBOTS, BATCH_PERIOD, step=step)
+    return replace(steps, units=ROBOTS * BATCH_PERIOD, scale=1e6)
 
 
 def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
@@ -302,6 +316,28 @@ def thousand_episodes() -> None:
     """Score the super-twisting controller on a thousand sampled operation episodes of 40 s."""
     scenarios = [sample("operation", Conditions(), stream(1, EVALUATION, i)) for i in range(1000)]
     evaluate(make("sta", scenarios[0].nominal), scenarios)
+
+
+def closed_loops(step: float) -> list[Trajectory]:
+    """Run `lqg` through the beginnings of operation episodes, up to a motion of the joints."""
+    scenarios = [
+        replace(
+            scenario,
+            duration=LOOP_TIME,
+            conditions=replace(scenario.conditions, physics_step=step),
+        )
+        for scenario in suite("operation")[:LOOPS]
+    ]
+    return rollout(make("lqg", scenarios[0].nominal), scenarios)
+
+
+def loop_errors() -> dict[str, float]:
+    """How far each step but the last of `STEPS` takes `lqg` from where the last does, nm."""
+    *positions, exact = (
+        np.stack([trajectory.error for trajectory in closed_loops(step)]) for step in STEPS.values()
+    )
+    errors = [1e9 * float(np.abs(position - exact).max()) for position in positions]
+    return dict(zip(STEPS, errors, strict=False))
 
 
 def timed(job: Callable[[], object]) -> float:

@@ -35,7 +35,7 @@ class Range:
         """The value that lies at a place."""
         if not self.log:
             return self.low + place * (self.high - self.low)
-        value = self.low * (self.high / self.low) ** place
+        value: float = self.low * (self.high / self.low) ** place
         return min(max(value, self.low), self.high)
 
     def place(self, value: float) -> float:

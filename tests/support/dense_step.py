@@ -24,6 +24,10 @@ class Moment(NamedTuple):
     p_dot: Array  # (2,) m/s
     reference: Array  # (2,) head deflection, rad, and its rate, rad/s
     thrust: Array  # (thrusters,) N
+    # Of the step before; zero at the start.
+    theta_ddot: Array  # (n,) rad/s^2
+    p_ddot: Array  # (2,) m/s^2
+    link_ddot: Array  # (n, 2) m/s^2 of the link centres, less that of the water
 
 
 def random_moment(robot: Robot, rng: np.random.Generator, steps: int) -> Moment:
@@ -36,6 +40,9 @@ def random_moment(robot: Robot, rng: np.random.Generator, steps: int) -> Moment:
         p_dot=rng.normal(0.0, 1.0, 2),
         reference=rng.normal(0.0, 1.0, 2),
         thrust=rng.normal(0.0, 10.0, len(robot.thrusters)),
+        theta_ddot=rng.normal(0.0, 100.0, robot.links),
+        p_ddot=rng.normal(0.0, 10.0, 2),
+        link_ddot=rng.normal(0.0, 10.0, (robot.links, 2)),
     )
 
 
@@ -50,7 +57,15 @@ def read(simulation: Simulation, index: int = 0) -> Moment:
         p_dot=rows.row[[layout.V_X, layout.V_Y]],
         reference=rows.row[[layout.DEFLECTION, layout.DEFLECTION_RATE]],
         thrust=rows.forces().copy(),
+        theta_ddot=rows.links(layout.ALPHA).copy(),
+        p_ddot=rows.row[[layout.A_X, layout.A_Y]],
+        link_ddot=np.stack([rows.links(layout.LINK_AX), rows.links(layout.LINK_AY)], axis=1),
     )
+
+
+def flat(moment: Moment) -> Array:
+    """Return all numbers of a moment in one row."""
+    return np.concatenate([np.ravel(part) for part in moment])
 
 
 def place(simulation: Simulation, moment: Moment, index: int = 0) -> None:
@@ -64,6 +79,9 @@ def place(simulation: Simulation, moment: Moment, index: int = 0) -> None:
     rows.row[[layout.V_X, layout.V_Y]] = moment.p_dot
     rows.row[[layout.DEFLECTION, layout.DEFLECTION_RATE]] = moment.reference
     rows.forces()[:] = moment.thrust
+    rows.links(layout.ALPHA)[:] = moment.theta_ddot
+    rows.row[[layout.A_X, layout.A_Y]] = moment.p_ddot
+    rows.links(layout.LINK_AX)[:], rows.links(layout.LINK_AY)[:] = moment.link_ddot.T
     simulation.restore(snapshot)
 
 
@@ -71,65 +89,100 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
     """Return the moment one physics step later, under thruster commands in N."""
     conditions, water = scenario.conditions, scenario.water
     h = conditions.physics_step
-    implicit = conditions.integrator == "midpoint"
+    lead = h / 2 if conditions.integrator == "midpoint" else 0.0
     t = moment.steps * h
 
-    reference = filtered(scenario, moment.reference, t, h)
+    target, target_at_end = deflections(scenario, t, h)
+    reference = filtered(scenario, moment.reference, target, target_at_end)
+    if scenario.inspection.filter_frequency is None:
+        asked = np.array([target, 0.0])
+    else:
+        asked = moment.reference + lead / h * (reference - moment.reference)
+    torque, joint_inertia = joint_torques(robot, scenario, moment, asked, lead)
+
     tau = conditions.thruster_time_constant
     kept = np.exp(-h / tau) if tau > 0.0 else 0.0
-    thrust = kept * moment.thrust + (1.0 - kept) * command
+    mean_kept = tau / h * (1.0 - kept)  # the integral of exp(-s / tau) over the step, over h
+    thrust = command + kept * (moment.thrust - command)
+    mean_thrust = command + mean_kept * (moment.thrust - command)
 
-    # Joint controllers: symplectic Euler takes them at the end of the step, as far as known there.
-    k_p = scenario.joint_stiffness or robot.joint_stiffness
-    k_d = scenario.joint_damping or robot.joint_damping
-    joints = robot.links - 1
-    bends = np.arange(joints) >= joints - scenario.inspection.bending_joints
-    asked, asked_rate = reference if implicit else moment.reference
-    share = bends / scenario.inspection.bending_joints
-    phi, phi_dot = -np.diff(moment.theta), -np.diff(moment.theta_dot)
-    ahead = h * phi_dot if implicit else 0.0
-    torque = k_p * (share * asked - phi - ahead) + k_d * (share * asked_rate - phi_dot)
-
-    angle = 2.0 * np.pi / water.period * t + np.array(water.phase)
+    angle = 2.0 * np.pi / water.period * (t + lead) + np.array(water.phase)
     swing = np.array(water.amplitude)
     current = water.current + swing * np.sin(angle)
     current_rate = swing * 2.0 * np.pi / water.period * np.cos(angle)
-    q_ddot = accelerations(
+
+    ahead = moment._replace(
+        theta=moment.theta + lead * moment.theta_dot,
+        theta_dot=moment.theta_dot + lead * moment.theta_ddot,
+        p_dot=moment.p_dot + lead * moment.p_ddot,
+    )
+    q_ddot, link_ddot = accelerations(
         robot,
         np.array(robot.hydrodynamic_coefficients) * water.coefficients,
-        moment,
-        np.concatenate([torque, thrust]),
+        ahead,
+        np.concatenate([torque, mean_thrust]),
         current,
         conditions.hydrodynamics,
-        step=h if implicit else 0.0,
-        joint_inertia=h * k_d + h**2 * k_p if implicit else 0.0,
+        lead,
+        joint_inertia,
     )
-    theta_dot = moment.theta_dot + h * q_ddot[: robot.links]
+    theta_ddot = q_ddot[: robot.links]
     # All water accelerating alike carries a neutrally buoyant robot along.
-    p_dot = moment.p_dot + h * (q_ddot[robot.links :] + current_rate)
+    p_ddot = q_ddot[robot.links :] + current_rate
     return Moment(
         steps=moment.steps + 1,
-        theta=moment.theta + h * (theta_dot if implicit else moment.theta_dot),
-        theta_dot=theta_dot,
-        p=moment.p + h * (p_dot if implicit else moment.p_dot),
-        p_dot=p_dot,
+        theta=moment.theta + h * (moment.theta_dot + lead * theta_ddot),
+        theta_dot=moment.theta_dot + h * theta_ddot,
+        p=moment.p + h * (moment.p_dot + lead * p_ddot),
+        p_dot=moment.p_dot + h * p_ddot,
         reference=reference,
         thrust=thrust,
+        theta_ddot=theta_ddot,
+        p_ddot=p_ddot,
+        link_ddot=link_ddot,
     )
 
 
-def filtered(scenario: Scenario, reference: Array, t: float, h: float) -> Array:
-    """Return the deflection and its rate h later, by the matrix exponential of the filter."""
-    past = [
-        size
-        for time, size in zip(scenario.shifts, scenario.inspection.deflections, strict=False)
-        if t >= time
-    ]
-    target = np.array([past[-1] if past else 0.0, 0.0])
-    w = scenario.inspection.filter_frequency
+def joint_torques(
+    robot: Robot, scenario: Scenario, moment: Moment, asked: Array, lead: float
+) -> tuple[Array, float]:
+    """Return the joint torques of a step, and what they lose per relative acceleration in it.
+
+    The controllers are asked for a deflection and a rate; their answer to the state is
+    u_1 - (u_0 - u_-1) / 2 from its values at the ends of this step and of the one before.
+    """
+    k_p = scenario.joint_stiffness or robot.joint_stiffness
+    k_d = scenario.joint_damping or robot.joint_damping
+    joints, bending = robot.links - 1, scenario.inspection.bending_joints
+    share = (np.arange(joints) >= joints - bending) / bending
+    h = 2.0 * lead
+
+    def held(phi: Array, rate: Array) -> Array:
+        return -k_p * phi - k_d * rate
+
+    phi, rate = -np.diff(moment.theta), -np.diff(moment.theta_dot)
+    before = -np.diff(moment.theta_ddot)
+    rate_before = rate - h * before
+    last = held(phi - h * (rate_before + rate) / 2, rate_before)
+    now, coming = held(phi, rate), held(phi + h * rate, rate)  # but for the new acceleration
+    of_state = coming - (now - last) / 2
+    return share * (k_p * asked[0] + k_d * asked[1]) + of_state, h * k_d + h**2 / 2 * k_p
+
+
+def deflections(scenario: Scenario, t: float, h: float) -> tuple[float, float]:
+    """Return the deflection that is asked for, as its mean from t to t + h, and at t + h."""
+    sizes = np.diff(scenario.inspection.deflections, prepend=0.0)[: len(scenario.shifts)]
+    passed = np.clip((t + h - np.array(scenario.shifts)) / h, 0.0, 1.0)
+    return float(sizes @ passed), float(sizes @ (passed > 1e-6))
+
+
+def filtered(scenario: Scenario, reference: Array, target: float, target_at_end: float) -> Array:
+    """Return the deflection and its rate a step later, by the matrix exponential of the filter."""
+    w, h = scenario.inspection.filter_frequency, scenario.conditions.physics_step
     if w is None:
-        return target
-    return target + expm(h * np.array([[0.0, 1.0], [-w * w, -2.0 * w]])) @ (reference - target)
+        return np.array([target_at_end, 0.0])
+    rest = np.array([target, 0.0])
+    return rest + expm(h * np.array([[0.0, 1.0], [-w * w, -2.0 * w]])) @ (reference - rest)
 
 
 def accelerations(
@@ -139,10 +192,14 @@ def accelerations(
     inputs: Array,
     current: Array,
     hydrodynamics: str,
-    step: float,
+    lead: float,
     joint_inertia: float,
-) -> Array:
-    """Return q_ddot, (n + 2,), with step times the slope of the drag added to the inertia."""
+) -> tuple[Array, Array]:
+    """Return q_ddot, (n + 2,), and the accelerations of the link centres, (n, 2).
+
+    The drag is that of the moment plus its slope times lead times what the accelerations have
+    changed by since the step before.
+    """
     c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
     body = oracle.links(robot, moment.theta)
     omega = moment.theta_dot
@@ -150,9 +207,15 @@ def accelerations(
     v_t = np.einsum("ic,ic->i", body.t, V)
     v_n = np.einsum("ic,ic->i", body.n, V)
 
+    slope_t = lead * c_t * (1.0 + 2.0 * np.abs(v_t))
+    slope_n = lead * c_n * (1.0 + 2.0 * np.abs(v_n))
+    slope_yaw = lead * (lambda_2 + 2.0 * lambda_3 * np.abs(omega))
     F_t = -c_t * (v_t + v_t * np.abs(v_t))
     F_n = -c_n * (v_n + v_n * np.abs(v_n))
     N = -lambda_2 * omega - lambda_3 * omega * np.abs(omega)
+    F_t += slope_t * np.einsum("ic,ic->i", body.t, moment.link_ddot)
+    F_n += slope_n * np.einsum("ic,ic->i", body.n, moment.link_ddot)
+    N += slope_yaw * moment.theta_ddot
     if hydrodynamics == "consistent":
         F_t += mu * v_n * omega
         F_n += mu * v_t * omega
@@ -160,21 +223,21 @@ def accelerations(
     else:
         F_n -= mu * omega * (body.t @ current)
 
-    along = robot.link_mass + step * c_t * (1.0 + 2.0 * np.abs(v_t))
-    across = robot.link_mass + mu + step * c_n * (1.0 + 2.0 * np.abs(v_n))
-    yaw = robot.link_inertia + lambda_1 + step * (lambda_2 + 2.0 * lambda_3 * np.abs(omega))
-    inertia = np.einsum("i,ia,ib->iab", along, body.t, body.t)
-    inertia += np.einsum("i,ia,ib->iab", across, body.n, body.n)
+    inertia = np.einsum("i,ia,ib->iab", robot.link_mass + slope_t, body.t, body.t)
+    inertia += np.einsum("i,ia,ib->iab", robot.link_mass + mu + slope_n, body.n, body.n)
+    yaw = robot.link_inertia + lambda_1 + slope_yaw
     G = oracle.input_matrix(robot, moment.theta)
     D = G[:, : robot.links - 1]
     M = np.einsum("iap,iab,ibq->pq", body.jacobian, inertia, body.jacobian)
     M += np.diag(np.concatenate([yaw, np.zeros(2)])) + joint_inertia * D @ D.T
 
-    known = np.einsum("iab,ibj,j->ia", inertia, body.centripetal, omega**2)
-    F = F_t[:, None] * body.t + F_n[:, None] * body.n - known
+    centripetal = body.centripetal @ omega**2
+    F = F_t[:, None] * body.t + F_n[:, None] * body.n
+    F -= np.einsum("iab,ib->ia", inertia, centripetal)
     force = np.einsum("icq,ic->q", body.jacobian, F) + G @ inputs
     force[: robot.links] += N
-    return np.linalg.solve(M, force)
+    q_ddot = np.linalg.solve(M, force)
+    return q_ddot, body.jacobian @ q_ddot + centripetal
 
 
 class _Rows:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -14,6 +15,7 @@ from usm_cli.speed import (
     BATCH_PERIOD,
     ROBOTS,
     SINGLE_PERIOD,
+    STEPS,
     Figure,
     Growth,
     SpeedResult,
@@ -29,7 +31,8 @@ from usm_gym.support.validation import require
 DESCRIPTION = """\
 Measure the speed on this machine. Figures and their peers are measured in the same run, in turns,
 round by round. Prints medians with the smallest and largest values, and names the peers that are
-not installed (extra `bench`). Takes two minutes; let the machine do nothing else meanwhile.
+not installed (extra `bench`). Finer physics steps have their price beside the error that they
+leave, against the finest. Takes two minutes; let the machine do nothing else meanwhile.
 """
 
 PEERS = {
@@ -56,6 +59,14 @@ MEANINGS = {
     "vector_env_ratio_sync": "SyncVectorEnv / native vector environment",
     "vector_env_ratio_cartpole": "CartPole vector environment / ours",
     "second_thread_speedup": "one thread / two threads",
+    **{
+        f"step_{step}_second_us": f"simulated second at a step of {step}, {ROBOTS} robots, each, us"
+        for step in STEPS
+    },
+    **{
+        f"step_{step}_error_nm": f"error that a step of {step} makes in the position of lqg, nm"
+        for step in list(STEPS)[:-1]
+    },
     "paper_rate_40s_s": "40 s at 1e-5 s with observer and STA, s",
     "evaluate_suite_s": "operation suite, six policies, s",
     "thousand_episodes_s": "1000 operation episodes of 40 s with sta, s",
@@ -97,6 +108,8 @@ def run(arguments: argparse.Namespace) -> None:
             times[name] = [job() for _ in range(repeats)]
             bar.advance(total)
     measured = {name: summarise(values) for name, values in times.items()}
+    for step, error in benchmark.loop_errors().items():
+        measured[f"step_{step}_error_nm"] = summarise([error])
     for ratio, (slow, fast) in PEERS.items():
         if slow in times:
             pairs = zip(times[slow], times[fast], strict=True)
@@ -132,6 +145,10 @@ def available() -> tuple[list[Timing], list[str]]:
         "episode_start_us": lambda name: benchmark.start_timing(name, 64),
         "swimmer_v5_step_ns": lambda name: benchmark.swimmer_timing(name, 500),
         "cartpole_vector_env_step_ns": lambda name: benchmark.cartpole_timing(name, ROBOTS, 200),
+        **{
+            f"step_{step}_second_us": partial(benchmark.second_timing, step=size)
+            for step, size in STEPS.items()
+        },
     }
     timings, missing = [], []
     for name, maker in makers.items():

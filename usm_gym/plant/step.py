@@ -11,7 +11,7 @@ from usm_gym.kernels.compile import piece
 from usm_gym.kernels.elementary import sincos
 from usm_gym.kernels.lanes import load, store
 from usm_gym.plant.chain import accelerate, kinematics
-from usm_gym.plant.joints import advance_references, asked_torque, joint_torques
+from usm_gym.plant.joints import advance_references, joint_torques
 from usm_gym.plant.layout import *
 from usm_gym.plant.thrusters import push
 
@@ -52,9 +52,7 @@ def integrate(block, like, wide, stride, links, h, lead):
 def physics_step(block, like, wide, stride, plant, base):
     """One physics step from kinematics that are known; arguments as in `chain.accelerate`."""
     links, h, lead = plant.links, plant.h, plant.lead
-    before = asked_torque(block, like)
-    advance_references(block, like, plant.shifts, h)
-    asked = before + (lead / h) * (asked_torque(block, like) - before)
+    asked = advance_references(block, like, plant.shifts, h, lead)
     push(block, like, plant)
     joint_torques(block, like, wide, stride, links, lead, asked)
     accelerate(block, like, wide, stride, links, base, plant)

@@ -110,6 +110,9 @@ QUANTITIES = {
         "error of the hydrodynamic coefficients, up to [1]", (0.0, 0.2, 0.4, 0.6), model
     ),
     "rate": Quantity("control rate [Hz]", (10.0, 20.0, 25.0, 50.0, 100.0), rate),
+    "step": Quantity(
+        "physics step [ms]", (0.1, 0.2, 0.5, 1.0, 2.0), condition("physics_step", 1e-3)
+    ),
 }
 
 

@@ -25,6 +25,7 @@ SCENARIOS = suite("operation")[:2]
         ("current", 0.05),
         ("model", 0.2),
         ("rate", 50.0),
+        ("step", 1.0),
     ],
 )
 def test_the_suites_own_value_changes_nothing_and_another_one_thing(

@@ -59,13 +59,21 @@ def test_one_step_agrees_with_the_dense_oracle(
         assert relative_error(dense_step.read(simulation), expected, before) < 1e-12
 
 
+@pytest.mark.parametrize("frequency", [8.0, None])
 @pytest.mark.parametrize(("integrator", "step"), [("midpoint", 1e-3), ("explicit", 5e-5)])
-def test_a_control_period_is_many_steps_under_one_command(integrator: str, step: float) -> None:
+def test_a_control_period_is_many_steps_under_one_command(
+    integrator: str, step: float, frequency: float | None
+) -> None:
+    # The second change of the joint references falls inside a step.
     robot = Robot()
     conditions = replace(ROUGH, control_period=40 * step, physics_step=step, integrator=integrator)
     scenario = replace(
         sample("operation", conditions, np.random.default_rng(0)),
-        inspection=Inspection(times=(60 * step, 150 * step), deflections=(1.2, -0.8)),
+        inspection=Inspection(
+            times=(60 * step, 150.3 * step),
+            deflections=(1.2, -0.8),
+            filter_frequency=frequency,
+        ),
     )
     simulation = Simulation([scenario])
     start = moment = dense_step.read(simulation)
@@ -145,12 +153,14 @@ def exact_bend() -> Array:
     return y[: n + 2]
 
 
-@pytest.mark.parametrize(("integrator", "step"), [("midpoint", 1e-3), ("explicit", 1e-4)])
-def test_the_integrator_converges_in_first_order(integrator: str, step: float) -> None:
+@pytest.mark.parametrize(
+    ("integrator", "step", "order"), [("midpoint", 1e-3, 2.0), ("explicit", 1e-4, 1.0)]
+)
+def test_the_integrator_converges(integrator: str, step: float, order: float) -> None:
     errors = [np.abs(bend(step / k, integrator) - exact_bend()).max() for k in (1, 2, 4)]
-    assert 0.0 < errors[0] < 0.01
+    assert 0.0 < errors[0] < 1e-3
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    np.testing.assert_allclose(orders, 1.0, atol=0.15)
+    np.testing.assert_allclose(orders, order, atol=0.1)
 
 
 @pytest.mark.parametrize("links", [2, 3, 10, 16])
@@ -166,6 +176,33 @@ def test_robots_of_any_length_keep_still_and_stable(links: int) -> None:
     np.testing.assert_allclose(np.diff(theta)[:-1], 0.0, atol=0.05)
     assert theta[-1] - theta[-2] == pytest.approx(0.5, abs=0.05)
     assert np.abs(simulation.read("position")[0]).max() < 0.5 * robot.link_length * links
+
+
+def fastest(links: int, step: float, gains: tuple[float, float]) -> float:
+    """Return the largest link rate, rad/s, under thrust and joint references that jump."""
+    robot = swimmer(links)
+    conditions = Conditions(control_period=0.02, physics_step=step, position_noise=0.0)
+    bends = Inspection(
+        bending_joints=links - 1, times=(1.0, 2.0), deflections=(1.5, -1.5), filter_frequency=None
+    )
+    scenario = Scenario(conditions=conditions, inspection=bends, duration=4.0, robot=robot)
+    simulation = Simulation([replace(scenario, joint_stiffness=gains[0], joint_damping=gains[1])])
+    rng, rates = np.random.default_rng(0), []
+    for _ in range(20):
+        action = rng.uniform(-1.0, 1.0, (1, len(robot.thrusters))).astype(np.float32)
+        for _ in range(10):
+            simulation.step(action)
+            rates.append(np.abs(simulation.read("theta_dot")).max())
+    return float(np.max(rates))  # not finite if any is
+
+
+@pytest.mark.parametrize("gains", [(20.0, 5.0), (9000.0, 150.0), (2e5, 5e3)])
+@pytest.mark.parametrize("links", [2, 3, 16, 17])
+def test_stiff_joints_are_stable_at_coarse_steps(links: int, gains: tuple[float, float]) -> None:
+    # Two links turn by half a radian in 20 ms, which no step with explicit angles survives.
+    for step in (5e-3, 1e-2, 2e-2)[: 2 if links == 2 else 3]:
+        # Control instants miss more of how the joints spring at a jump, the finer the step.
+        assert fastest(links, step, gains) < 3.0 * fastest(links, 1e-3, gains)
 
 
 def references_of(simulation: Simulation) -> Array:
@@ -209,14 +246,14 @@ def test_joint_references_follow_the_critically_damped_filter(
 
 def test_joint_references_without_a_filter_are_steps() -> None:
     inspection = Inspection(
-        bending_joints=4, times=(0.2, 0.5), deflections=(1.2, -0.8), filter_frequency=None
+        bending_joints=4, times=(0.2, 0.4996), deflections=(1.2, -0.8), filter_frequency=None
     )
     scenario = Scenario(conditions=IDEAL, inspection=inspection)
     for copies in (1, 2):
         simulation = Simulation([scenario] * copies)
         for k in range(1, 40):
             simulation.step(np.zeros((copies, 5), np.float32))
-            deflection = 0.0 if k <= 10 else 1.2 if k <= 25 else -0.8
+            deflection = 0.0 if k <= 10 else 1.2 if k < 25 else -0.8
             expected = np.zeros((3, 15))
             expected[0, 11:] = deflection / 4
             np.testing.assert_allclose(references_of(simulation), expected, atol=1e-7)
@@ -299,7 +336,7 @@ def run(scenarios: Sequence[Scenario], first: int = 0) -> list[Array]:
             simulation.attitude_error.copy(),
         ]
     moments = [dense_step.read(simulation, k) for k in range(size)]
-    return [*seen, np.stack([np.hstack(moment) for moment in moments])]
+    return [*seen, np.stack([dense_step.flat(moment) for moment in moments])]
 
 
 @cache
@@ -342,7 +379,7 @@ def test_the_lane_does_not_matter() -> None:
         simulation = Simulation([mixture()[19 - k]])
         for action in actions()[:, k : k + 1]:
             simulation.step(action)
-        assert same(turned[-1][k], np.hstack(dense_step.read(simulation)))
+        assert same(turned[-1][k], dense_step.flat(dense_step.read(simulation)))
 
 
 def test_the_mixture_is_one() -> None:
