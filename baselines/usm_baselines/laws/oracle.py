@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_baselines.estimation import kalman
-from usm_baselines.laws.mpc import receding, receding_gain
+from usm_baselines.planning import Foreseen, improve, problem_of
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
@@ -48,14 +48,12 @@ class Oracle(ScriptedPolicy):
         self._inertia, drag = kalman.straight_body(nominal.robot)
         h, lag = nominal.control_period, nominal.thruster_time_constant
         self._periods = max(1, round(self.gains.horizon / h))
-        self._gain = np.stack(
-            [
-                receding_gain(
-                    kalman.sampled(damping, lag, h), self._periods, self.gains.variation_weight * m
-                )
-                for m, damping in zip(self._inertia, drag / self._inertia, strict=True)
-            ]
-        )
+        import os
+        transition = np.stack([kalman.sampled(d, lag, h) for d in drag / self._inertia])
+        weights = (self.gains.variation_weight, float(os.environ.get("AL", 1e-5)), float(os.environ.get("BE", 1e-6)))
+        self._problem = problem_of(transition, self._inertia, weights)
+        self.ROLL = int(os.environ.get("ROLL", 1))
+        self._periods = max(1, round(float(os.environ.get("HOR", .5)) / h))
         self._copy: Simulation | None = None
 
     def predict(
@@ -83,15 +81,34 @@ class Oracle(ScriptedPolicy):
         self._copy = self._copy_of(snapshot)
         return super().predict(observation, state, episode_start, deterministic)
 
-    def control(self, signals: Signals, state: Array, force: Array) -> None:
-        """Run ahead with the commands held, and correct what comes of it."""
+    ROLL, SWEEPS = 1, 2
+    @property
+    def law_shape(self):
+        return (self._periods, self._model.thrusters)
+
+    def _act(self, observation, state):
         copy: Any = self._copy
-        held = (copy.read("command") / copy.limit[:, np.newaxis]).astype(np.float32)
-        ahead = np.empty((self._periods, *force.shape, 1))
-        for period in ahead:
-            copy.step(held)
-            period[:, :, 0] = copy.error
-        receding(signals, self._model, self._inertia, self._gain, ahead, force)
+        size, periods, m = len(observation), self._periods, self._model.thrusters
+        seen = observation
+        started = state[:, 0] > 0
+        plan = state[:, self._own:].reshape(size, periods, m).copy()
+        plan[:, :-1] = plan[:, 1:]
+        start = _SNAP = copy.snapshot() if self.ROLL > 1 else None
+        for roll in range(self.ROLL):
+            if roll: copy.restore(start)
+            foreseen = Foreseen(np.empty((size, periods, 2)), np.empty((size, periods, 2)), np.empty((size, periods)), np.empty((size, periods, 3, m)))
+            T = np.empty((size, 3, m))
+            for i in range(periods):
+                self._world.allocate(copy.observation, T)
+                foreseen.allocation[:, i] = T
+                foreseen.moment[:, i] = -self.gains.heading_gain * copy.attitude_error[:, 0]
+                foreseen.thrust[:, i] = (T[:, :2] * copy.read("force")[:, None]).sum(axis=2)
+                copy.step((plan[:, i] / copy.limit[:, None]).astype(np.float32))
+                foreseen.error[:, i] = copy.error
+            improve(plan, copy.limit, foreseen, self._problem)
+        state[:, 0] = 1.0
+        state[:, self._own:] = plan.reshape(size, -1)
+        return (plan[:, 0] / copy.limit[:, None]).astype(np.float32)
 
     def _copy_of(self, snapshot: Any) -> Simulation:
         copy, scenarios = self._copy, snapshot.scenarios
