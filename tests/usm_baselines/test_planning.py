@@ -1,16 +1,20 @@
 """Plans within limits: the least squares that they solve, solved densely by another method."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
+from usm_baselines import planning
 from usm_baselines.estimation import kalman
-from usm_baselines.planning import Foreseen, Problem, improve, problem_of
+from usm_baselines.planning import Foreseen, Problem, problem_of
 
 from usm_gym import Robot
 
 Array = NDArray[np.float64]
 PERIODS, THRUSTERS = 8, 5
+improve: Any = planning.improve
 INERTIA = kalman.straight_body(Robot())[0]
 
 
@@ -69,7 +73,7 @@ def test_a_plan_is_the_least_squares_within_the_limits(lag: float, limit: float)
         reached = np.sum(residuals(plan[b] - before[b], before[b], at[b], given) ** 2)
         assert reached == pytest.approx(expected, rel=1e-4)
         assert np.abs(plan[b]).max() <= limit * (1 + 1e-8)
-        met += np.count_nonzero(best.active_mask)
+        met += int(np.count_nonzero(best.active_mask))
     assert (met > 10) == (limit < 10.0)
 
 
