@@ -1,25 +1,40 @@
 """The limit: predictive control with the true state, the exact plant and the future.
 
-As `mpc`, but the free response is run on a copy of the simulation itself: true coefficients and
-water, true position and velocity, all changes of the joint references that are to come. No
-controller can know this; what it leaves is what thrusters and control period allow.
+It keeps a plan of thruster commands. Every control period it carries the plan out on a copy of the
+simulation itself: true coefficients and water, true position and velocity, all changes of the joint
+references that are to come. Then it corrects the plan, within the limits of the thrusters
+(`planning`), and applies the first command. No controller can know this; what it leaves is what
+thrusters and control period allow.
+
+The position comes first. The moment that turns the heading error back gives way to it where
+thrusters are at their limits.
+
+Source: M. Diehl, H. G. Bock, J. P. Schloeder, A real-time iteration scheme for nonlinear
+optimization in optimal feedback control, SIAM Journal on Control and Optimization 43, 2005 (one
+correction in a period, begun from the last plan).
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_baselines.estimation import kalman
-from usm_baselines.laws.mpc import receding, receding_gain
-from usm_baselines.policy import ScriptedPolicy
-from usm_baselines.signals import Array, Signals
+from usm_baselines.planning import Foreseen, improve, problem_of
+from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
+from usm_baselines.signals import Array
 from usm_baselines.space import Gain
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
+
+# Errors of the position, m, that are as bad as a moment that is wrong by 1 N m, and as 1 N of a
+# thruster. They share the force out among the thrusters and cost no position: without limits,
+# these can make any force and moment.
+MOMENT_WEIGHT, EFFORT_WEIGHT = 1e-5, 1e-6
 
 
 class OracleGains(NamedTuple):
@@ -28,35 +43,42 @@ class OracleGains(NamedTuple):
     variation_weight: float = Gain(
         3e-6,
         "m/N",
-        "error that is as bad as a change of the force by 1 N in a period",
+        "error that is as bad as a force that is 1 N from what the thrusters make",
         positive=True,
     )
-    horizon: float = Gain(0.2, "s", "how far it looks ahead", positive=True)
-    heading_gain: float = Gain(100.0, "N m/rad", "heading gain k_psi")
+    horizon: float = Gain(0.3, "s", "how far it plans", positive=True)
+    heading_gain: float = HEADING_GAIN
 
 
 class Oracle(ScriptedPolicy):
-    """Predictive control that is given the true state: no competitor."""
+    """Predictive control that is given the true state: no competitor.
+
+    Its state has the plan, N. Its actions are within the limits.
+    """
 
     Gains = OracleGains
     privileged = True
     planar = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
-        """Compute the gain of the regulator; gains other than the defaults by name."""
+        """Set up the problem; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
-        self._inertia, drag = kalman.straight_body(nominal.robot)
+        inertia, drag = kalman.straight_body(nominal.robot)
         h, lag = nominal.control_period, nominal.thruster_time_constant
         self._periods = max(1, round(self.gains.horizon / h))
-        self._gain = np.stack(
-            [
-                receding_gain(
-                    kalman.sampled(damping, lag, h), self._periods, self.gains.variation_weight * m
-                )
-                for m, damping in zip(self._inertia, drag / self._inertia, strict=True)
-            ]
+        self._problem = problem_of(
+            np.stack([kalman.sampled(damping, lag, h) for damping in drag / inertia]),
+            inertia,
+            self.gains.variation_weight,
+            MOMENT_WEIGHT,
+            EFFORT_WEIGHT,
         )
         self._copy: Simulation | None = None
+
+    @cached_property
+    def law_shape(self) -> tuple[int, ...]:
+        """The plan: commands of the thrusters in each period."""
+        return self._periods, self._model.thrusters
 
     def predict(
         self,
@@ -83,15 +105,30 @@ class Oracle(ScriptedPolicy):
         self._copy = self._copy_of(snapshot)
         return super().predict(observation, state, episode_start, deterministic)
 
-    def control(self, signals: Signals, state: Array, force: Array) -> None:
-        """Run ahead with the commands held, and correct what comes of it."""
+    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
+        """Carry the plan on by a period, see what comes of it, correct it."""
         copy: Any = self._copy
-        held = (copy.read("command") / copy.limit[:, np.newaxis]).astype(np.float32)
-        ahead = np.empty((self._periods, *force.shape, 1))
-        for period in ahead:
-            copy.step(held)
-            period[:, :, 0] = copy.error
-        receding(signals, self._model, self._inertia, self._gain, ahead, force)
+        own = state[:, self._own :]
+        plan = own.reshape(len(own), *self.law_shape)
+        plan = np.concatenate([plan[:, 1:], plan[:, -1:]], axis=1)
+        foreseen = self._foresee(copy, plan)
+        improve(plan, copy.limit, foreseen, self._problem)
+        own[:] = plan.reshape(own.shape)
+        return _action(plan[:, 0], copy.limit)
+
+    def _foresee(self, copy: Simulation, plan: Array) -> Foreseen:
+        """Run ahead with a plan, (batch, periods, thrusters)."""
+        size, periods, thrusters = plan.shape
+        error, thrust = np.empty((2, size, periods, self._model.axes))
+        wanted, allocation = np.empty((size, periods)), np.empty((size, periods, 3, thrusters))
+        for i in range(periods):
+            self._world.allocate(copy.observation, allocation[:, i])
+            wanted[:, i] = -self.gains.heading_gain * copy.attitude_error[:, 0]
+            forces = allocation[:, i, : self._model.axes] * copy.read("force")[:, np.newaxis]
+            thrust[:, i] = forces.sum(axis=2)
+            copy.step(_action(plan[:, i], copy.limit))
+            error[:, i] = copy.error
+        return Foreseen(error, thrust, wanted, allocation)
 
     def _copy_of(self, snapshot: Any) -> Simulation:
         copy, scenarios = self._copy, snapshot.scenarios
@@ -104,3 +141,9 @@ class Oracle(ScriptedPolicy):
             copy = Simulation(scenarios)
         copy.restore(snapshot)
         return copy
+
+
+def _action(command: Array, limit: Array) -> NDArray[np.float32]:
+    """Commands over the limits, within them."""
+    share = command / limit[:, np.newaxis]
+    return np.clip(share, -1.0, 1.0).astype(np.float32)

@@ -9,6 +9,8 @@ import usm_baselines
 
 from usm_cli.selection import chosen_contenders
 from usm_gym import Robot, evaluate
+from usm_gym.evaluation import rollout, score
+from usm_gym.suites import suite
 from usm_gym.support.seeding import TUNING, stream
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import sample
@@ -29,8 +31,29 @@ def test_leaves_hundredths_of_a_millimetre(conditions: str) -> None:
         assert scores.per_episode[f"max_error_{axis}"].mean() < 5e-5
 
 
-def test_alone_and_side_by_side_the_bits_are_the_same() -> None:
-    episodes = [dataclasses.replace(each, duration=6.0) for each in scenarios("field", 3)]
+def test_knows_the_limits_of_the_thrusters() -> None:
+    # With clipped commands it would swing ever wider after the second change of the joints.
+    episode = dataclasses.replace(suite("operation-rough")[34], duration=24.0)
+    (mine,), (others,) = (
+        rollout(usm_baselines.make(id, episode.nominal), [episode]) for id in ("oracle", "mpc")
+    )
+    limit = episode.conditions.thruster_limit
+    assert np.abs(mine.command).max() <= limit
+    assert np.count_nonzero(np.abs(mine.command) > 0.99 * limit) > 10
+    for axis in "xy":
+        assert score(mine)[f"max_error_{axis}"] < 0.1 * score(others)[f"max_error_{axis}"]
+
+
+@pytest.mark.parametrize("limit", [20.0, 8.0])
+def test_alone_and_side_by_side_the_bits_are_the_same(limit: float) -> None:
+    episodes = [
+        dataclasses.replace(
+            each,
+            duration=6.0,
+            conditions=dataclasses.replace(each.conditions, thruster_limit=limit),
+        )
+        for each in scenarios("field", 3)
+    ]
     policy = usm_baselines.make("oracle", episodes[0].nominal)
     together = evaluate(policy, episodes).per_episode
     for i, episode in enumerate(episodes):

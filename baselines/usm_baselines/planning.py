@@ -1,0 +1,323 @@
+"""Thruster commands over a horizon within the thrusters' limits: a quadratic program.
+
+Of a plan it is known what comes of it. What changes of its commands add to that is taken from the
+linear model of the straight body (`kalman`). They minimise, summed over the periods,
+
+    |error|^2 + variation^2 |force - thrust|^2 + moment^2 (moment - wanted)^2 + effort^2 |u|^2,
+
+where the commands u, each within its limits, make the force and the moment, and the thrust is what
+the force lags behind to. If no limit is met this is one Newton step, from a Riccati recursion over
+the horizon. Else a primal-dual interior-point method takes several, each of them the same recursion
+with a term for every limit.
+
+Source: C. V. Rao, S. J. Wright, J. B. Rawlings, Application of interior-point methods to model
+predictive control, Journal of Optimization Theory and Applications 99, 1998.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from usm_baselines.estimation.kalman import COMMAND, ERROR, RATE, THRUST
+from usm_baselines.signals import Array
+from usm_gym.kernels.compile import compiled, piece
+
+# Axes, and numbers of the state: error, its rate and thrust over inertia of each axis.
+AXES, PER_AXIS = 2, 3
+NUMBERS = AXES * PER_AXIS
+# The interior-point method: how far inside the limits it begins, over the limit; its steps; how far
+# each of them may go towards the limits; by what it is to bring complementarity down.
+INSIDE, STEPS, REACH, SHRINKING = 0.1, 14, 0.99, 0.15
+# Commands nearer to a limit than this, over the limit, count as this far from it.
+NEAREST = 1e-9
+
+
+class Problem(NamedTuple):
+    """What the plans of all robots share.
+
+    Attributes:
+        transition: Of the state over a period, (6, 6).
+        input: What a force of 1 N commanded along an axis adds to it, (6, 2).
+        inertia: Inertia of the axes, kg, (2,).
+        variation: Error that is as bad as 1 N between force and thrust along an axis, m/N.
+        moment: Error that is as bad as a moment that is wrong by 1 N m, m/(N m).
+        effort: Error that is as bad as 1 N of a thruster, m/N.
+    """
+
+    transition: Array
+    input: Array
+    inertia: Array
+    variation: float
+    moment: float
+    effort: float
+
+
+class Foreseen(NamedTuple):
+    """What comes of the plans of a batch of robots, by period; or of the plan of one of them.
+
+    Attributes:
+        error: Position errors at the end, m, (batch, periods, 2).
+        thrust: Forces that the thrusters make along the axes at the beginning, N, the same shape.
+        wanted: Wanted moments, N m, (batch, periods).
+        allocation: Allocation matrices, (batch, periods, 3, thrusters).
+    """
+
+    error: Array
+    thrust: Array
+    wanted: Array
+    allocation: Array
+
+
+class Room(NamedTuple):
+    """Where the plan of one robot is worked on.
+
+    Attributes:
+        gain: Change of the commands over change of the state, (periods, thrusters, 6).
+        change: Change of the commands, N, (periods, thrusters).
+        error: What that changes of the errors, m, (periods, 2).
+        thrust: What it changes of the thrust, N, (periods, 2).
+        curvature: Second derivatives that the limits add, (periods, thrusters).
+        slope: First derivatives that they add, (periods, thrusters).
+        low: Multipliers of the lower limits, (periods, thrusters).
+        high: Multipliers of the upper limits, (periods, thrusters).
+    """
+
+    gain: Array
+    change: Array
+    error: Array
+    thrust: Array
+    curvature: Array
+    slope: Array
+    low: Array
+    high: Array
+
+
+def problem_of(
+    transition: Array, inertia: Array, variation: float, moment: float, effort: float
+) -> Problem:
+    """The problem of a robot whose axes have these transitions, see `kalman`, (2, 4, 6)."""
+    rows = [ERROR, RATE, THRUST]
+    A, B = np.zeros((NUMBERS, NUMBERS)), np.zeros((NUMBERS, AXES))
+    for axis in range(AXES):
+        own = slice(PER_AXIS * axis, PER_AXIS * (axis + 1))
+        A[own, own] = transition[axis][np.ix_(rows, rows)]
+        B[own, axis] = transition[axis][rows, COMMAND] / inertia[axis]
+    return Problem(A, B, inertia, variation, moment, effort)
+
+
+@compiled
+def add_product(X, Y, out):
+    """Add X Y to a matrix."""
+    for i in range(out.shape[0]):
+        for k in range(Y.shape[0]):
+            for j in range(out.shape[1]):
+                out[i, j] += X[i, k] * Y[k, j]
+
+
+@compiled
+def solve(H, X):
+    """Solve H Z = X by Cholesky's decomposition; Z replaces X, the factor the lower half of H."""
+    n = H.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            for k in range(j):
+                H[i, j] -= H[i, k] * H[j, k]
+            H[i, j] = np.sqrt(H[i, j]) if i == j else H[i, j] / H[j, j]
+    for c in range(X.shape[1]):
+        for i in range(n):
+            for k in range(i):
+                X[i, c] -= H[i, k] * X[k, c]
+            X[i, c] /= H[i, i]
+        for i in range(n - 1, -1, -1):
+            for k in range(i + 1, n):
+                X[i, c] -= H[k, i] * X[k, c]
+            X[i, c] /= H[i, i]
+
+
+@piece
+def misses(u, thrust, wanted, T, problem, D, C):
+    """Fill in the residuals D du + C (dx, 1) of force and moment in a period, weighted."""
+    for r in range(AXES + 1):
+        weight = problem.variation if r < AXES else problem.moment
+        C[r, NUMBERS] = -weight * (thrust[r] if r < AXES else wanted)
+        for j in range(u.size):
+            D[r, j] = weight * T[r, j]
+            C[r, NUMBERS] += D[r, j] * u[j]
+    for axis in range(AXES):
+        C[axis, PER_AXIS * axis + 2] = -problem.variation * problem.inertia[axis]
+
+
+@compiled
+def newton(u, foreseen, problem, room):
+    """Fill in the gains of the Newton step, and its changes where the state does not change."""
+    periods, m = u.shape
+    n, A, effort = NUMBERS, problem.transition, problem.effort**2
+    # Hessian and gradient of the value, the latter as the last column; so it is in VA, K and C.
+    V, VA, VB = np.zeros((n, n + 1)), np.empty((n, n + 1)), np.empty((n, m))
+    B, D, C = np.empty((n, m)), np.empty((AXES + 1, m)), np.zeros((AXES + 1, n + 1))
+    H, G, K = np.empty((m, m)), np.empty((m, n + 1)), np.empty((m, n + 1))
+    for i in range(periods - 1, -1, -1):
+        T = foreseen.allocation[i]
+        misses(u[i], foreseen.thrust[i], foreseen.wanted[i], T, problem, D, C)
+        for axis in range(AXES):
+            V[PER_AXIS * axis, PER_AXIS * axis] += 1.0
+            V[PER_AXIS * axis, n] += foreseen.error[i, axis]
+        for matrix in (B, VB, H):
+            matrix[:] = 0.0
+        for matrix in (VA, G):
+            matrix[:] = 0.0
+        add_product(problem.input, T[:AXES], B)
+        add_product(V, A, VA[:, :n])
+        VA[:, n] = V[:, n]
+        add_product(V, B, VB)
+        add_product(B.T, VB, H)
+        add_product(D.T, D, H)
+        add_product(B.T, VA, G)
+        add_product(D.T, C, G)
+        for j in range(m):
+            H[j, j] += effort + room.curvature[i, j]
+            G[j, n] += effort * u[i, j] + room.slope[i, j]
+        K[:] = -G
+        solve(H, K)
+        V[:] = 0.0
+        add_product(A.T, VA, V)
+        add_product(C.T, C, V)
+        add_product(G.T, K, V)
+        room.gain[i], room.change[i] = K[:, :n], K[:, n]
+
+
+@compiled
+def follow(foreseen, problem, room, closed):
+    """Follow the changes of the commands through the model; `closed` adds what the gains make."""
+    periods, m = room.change.shape
+    x, after = np.zeros(NUMBERS), np.empty(NUMBERS)
+    for i in range(periods):
+        T = foreseen.allocation[i]
+        for j in range(m):
+            for k in range(NUMBERS if closed else 0):
+                room.change[i, j] += room.gain[i, j, k] * x[k]
+        for r in range(NUMBERS):
+            after[r] = 0.0
+            for k in range(NUMBERS):
+                after[r] += problem.transition[r, k] * x[k]
+            for axis in range(AXES):
+                for j in range(m):
+                    after[r] += problem.input[r, axis] * T[axis, j] * room.change[i, j]
+        for axis in range(AXES):
+            room.thrust[i, axis] = problem.inertia[axis] * x[PER_AXIS * axis + 2]
+            room.error[i, axis] = after[PER_AXIS * axis]
+        x[:] = after
+
+
+@piece
+def change_by(share, u, foreseen, room):
+    """Make a share of the change that was followed."""
+    u += share * room.change
+    foreseen.error[:] += share * room.error
+    foreseen.thrust[:] += share * room.thrust
+
+
+@piece
+def distances(u, limit):
+    """How far a command is from its lower and from its upper limit, N."""
+    return max(limit + u, NEAREST * limit), max(limit - u, NEAREST * limit)
+
+
+@piece
+def multiplier_changes(mu, low, high, below, above, change):
+    """What brings the products of multipliers and distances to mu as the command changes."""
+    return (mu - low * change) / below - low, (mu + high * change) / above - high
+
+
+@compiled
+def go_inside(u, limit, foreseen, problem, room):
+    """Begin the interior-point method: away from the limits, with multipliers to match."""
+    periods, m = u.shape
+    inner = (1.0 - INSIDE) * limit
+    for i in range(periods):
+        for j in range(m):
+            room.change[i, j] = min(max(u[i, j], -inner), inner) - u[i, j]
+    follow(foreseen, problem, room, False)
+    change_by(1.0, u, foreseen, room)
+    D, C, cost = np.empty((AXES + 1, m)), np.empty((AXES + 1, NUMBERS + 1)), 0.0
+    for i in range(periods):
+        T = foreseen.allocation[i]
+        misses(u[i], foreseen.thrust[i], foreseen.wanted[i], T, problem, D, C)
+        for axis in range(AXES):
+            cost += foreseen.error[i, axis] ** 2
+        for r in range(AXES + 1):
+            cost += C[r, NUMBERS] ** 2
+    mu = INSIDE * cost / (periods * m)
+    for i in range(periods):
+        for j in range(m):
+            below, above = distances(u[i, j], limit)
+            room.low[i, j], room.high[i, j] = mu / below, mu / above
+
+
+@compiled
+def step_inside(u, limit, foreseen, problem, room):
+    """A step of the interior-point method."""
+    periods, m = u.shape
+    mu, share = 0.0, 1.0 / REACH
+    for i in range(periods):
+        for j in range(m):
+            below, above = distances(u[i, j], limit)
+            mu += room.low[i, j] * below + room.high[i, j] * above
+    mu *= SHRINKING / (2 * periods * m)
+    for i in range(periods):
+        for j in range(m):
+            below, above = distances(u[i, j], limit)
+            room.curvature[i, j] = room.low[i, j] / below + room.high[i, j] / above
+            room.slope[i, j] = mu / above - mu / below
+    newton(u, foreseen, problem, room)
+    follow(foreseen, problem, room, True)
+    for i in range(periods):
+        for j in range(m):
+            below, above = distances(u[i, j], limit)
+            low, high, change = room.low[i, j], room.high[i, j], room.change[i, j]
+            by_low, by_high = multiplier_changes(mu, low, high, below, above, change)
+            for distance, by in ((below, change), (above, -change), (low, by_low), (high, by_high)):
+                if by < 0.0:
+                    share = min(share, -distance / by)
+    share *= REACH
+    for i in range(periods):
+        for j in range(m):
+            below, above = distances(u[i, j], limit)
+            low, high, change = room.low[i, j], room.high[i, j], room.change[i, j]
+            by_low, by_high = multiplier_changes(mu, low, high, below, above, change)
+            room.low[i, j] += share * by_low
+            room.high[i, j] += share * by_high
+    change_by(share, u, foreseen, room)
+
+
+@compiled
+def improve(plan, limit, foreseen, problem):
+    """Improve the plans of a batch, in place, and with them what is foreseen.
+
+    Args:
+        plan: Commands, N, within their limits, (batch, periods, thrusters).
+        limit: Limits of the thrusters, N, (batch,).
+        foreseen: What comes of the plans.
+        problem: What they share.
+    """
+    size, periods, m = plan.shape
+    gain, changes = np.empty((periods, m, NUMBERS)), np.empty((2, periods, AXES))
+    rest = np.empty((5, periods, m))
+    room = Room(gain, rest[0], changes[0], changes[1], rest[1], rest[2], rest[3], rest[4])
+    for b in range(size):
+        u = plan[b]
+        own = Foreseen(
+            foreseen.error[b], foreseen.thrust[b], foreseen.wanted[b], foreseen.allocation[b]
+        )
+        room.curvature[:] = 0.0
+        room.slope[:] = 0.0
+        newton(u, own, problem, room)
+        follow(own, problem, room, True)
+        if np.abs(u + room.change).max() <= limit[b]:
+            change_by(1.0, u, own, room)
+            continue
+        go_inside(u, limit[b], own, problem, room)
+        for _ in range(STEPS):
+            step_inside(u, limit[b], own, problem, room)

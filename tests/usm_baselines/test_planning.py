@@ -1,0 +1,100 @@
+"""Plans within limits: the least squares that they solve, solved densely by another method."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from usm_baselines import planning
+from usm_baselines.estimation import kalman
+from usm_baselines.planning import Foreseen, Problem, problem_of
+
+from usm_gym import Robot
+
+Array = NDArray[np.float64]
+PERIODS, THRUSTERS = 8, 5
+improve: Any = planning.improve
+INERTIA = kalman.straight_body(Robot())[0]
+
+
+def problem(lag: float) -> Problem:
+    transition = np.stack([kalman.sampled(damping, lag, 0.02) for damping in (0.3, 8.0)])
+    return problem_of(transition, INERTIA, 3e-6, 1e-5, 1e-6)
+
+
+def foreseen(rng: np.random.Generator, size: int, error: float) -> Foreseen:
+    """Errors of this size that the limits matter for, and thrusters in arbitrary directions."""
+    return Foreseen(
+        rng.normal(0.0, error, (size, PERIODS, 2)),
+        rng.normal(0.0, 3.0, (size, PERIODS, 2)),
+        rng.normal(0.0, 5.0, (size, PERIODS)),
+        rng.normal(0.0, 1.0, (size, PERIODS, 3, THRUSTERS)),
+    )
+
+
+def residuals(change: Array, plan: Array, known: Foreseen, given: Problem) -> Array:
+    """What the plan of one robot is to make small, after a change of its commands."""
+    x, rows = np.zeros(6), []
+    for i in range(PERIODS):
+        T, command = known.allocation[i], plan[i] + change[i]
+        thrust = known.thrust[i] + INERTIA * x[[2, 5]]
+        x = given.transition @ x + given.input @ (T[:2] @ change[i])
+        rows += [
+            known.error[i] + x[[0, 3]],
+            given.variation * (T[:2] @ command - thrust),
+            [given.moment * (T[2] @ command - known.wanted[i])],
+            given.effort * command,
+        ]
+    return np.concatenate(rows)
+
+
+def one(known: Foreseen, b: int) -> Foreseen:
+    return Foreseen(*(each[b].copy() for each in known))
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.1])
+@pytest.mark.parametrize("limit", [5.0, 1e6])
+def test_a_plan_is_the_least_squares_within_the_limits(lag: float, limit: float) -> None:
+    rng, size = np.random.default_rng(3), 4
+    known, given = foreseen(rng, size, 1e-4), problem(lag)
+    plan = rng.uniform(-5.0, 5.0, (size, PERIODS, THRUSTERS))
+    before, at = plan.copy(), [one(known, b) for b in range(size)]
+    improve(plan, np.full(size, limit), known, given)
+    met = 0
+    for b in range(size):
+        zero = residuals(np.zeros((PERIODS, THRUSTERS)), before[b], at[b], given)
+        units = np.eye(PERIODS * THRUSTERS).reshape(-1, PERIODS, THRUSTERS)
+        J = np.stack([residuals(unit, before[b], at[b], given) - zero for unit in units], axis=1)
+        low, high = (side * limit - before[b].ravel() for side in (-1.0, 1.0))
+        # Scaled, for what the solver counts as converged.
+        best = lsq_linear(1e5 * J, -1e5 * zero, (low, high), method="bvls", tol=1e-12)
+        expected = np.sum((J @ best.x + zero) ** 2)
+        reached = np.sum(residuals(plan[b] - before[b], before[b], at[b], given) ** 2)
+        assert reached == pytest.approx(expected, rel=1e-4)
+        assert np.abs(plan[b]).max() <= limit * (1 + 1e-8)
+        met += int(np.count_nonzero(best.active_mask))
+    assert (met > 10) == (limit < 10.0)
+
+
+def test_what_is_foreseen_changes_with_the_plan() -> None:
+    rng = np.random.default_rng(4)
+    known, given = foreseen(rng, 1, 1e-4), problem(0.1)
+    plan = rng.uniform(-5.0, 5.0, (1, PERIODS, THRUSTERS))
+    before, start = plan[0].copy(), one(known, 0)
+    improve(plan, np.array([5.0]), known, given)
+    after = residuals(plan[0] - before, before, start, given).reshape(PERIODS, -1)
+    np.testing.assert_allclose(known.error[0], after[:, :2], rtol=1e-9, atol=1e-15)
+
+
+def test_robots_are_planned_for_alone() -> None:
+    rng, size = np.random.default_rng(5), 3
+    known, given = foreseen(rng, size, 1e-4), problem(0.1)
+    limit = np.array([2.0, 1e6, 10.0])
+    plan = rng.uniform(-2.0, 2.0, (size, PERIODS, THRUSTERS))
+    alone = [(plan[b : b + 1].copy(), one(known, b)) for b in range(size)]
+    improve(plan, limit, known, given)
+    for b, (own, at) in enumerate(alone):
+        single = Foreseen(*(each[np.newaxis] for each in at))
+        improve(own, limit[b : b + 1], single, given)
+        assert np.array_equal(own[0], plan[b])
