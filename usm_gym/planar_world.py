@@ -130,7 +130,8 @@ class PlanarWorld(World):
 
         `position`, `velocity` and `acceleration` are those of the centre of mass, `force` has the
         thrusters' forces, which lag behind `command`, `coefficients` the true hydrodynamic ones;
-        joint i is asked for `joint_shares[i] * deflection`.
+        joint i is asked for `joint_shares[i] * deflection`. `acceleration`, what pushes the links,
+        and `sine` and `cosine` of their angles are of the middle of the last physics step.
         """
         links = self.links
         first = rows.first_command(links)
@@ -144,6 +145,10 @@ class PlanarWorld(World):
             "coefficients": (rows.C_T, 6),
             "joint_shares": (rows.row_of(rows.SHARE, links), links - 1),
             "deflection": (rows.DEFLECTION, 1),
+            "push_along": (rows.row_of(rows.PUSH_T, links), links),
+            "push_across": (rows.row_of(rows.PUSH_N, links), links),
+            "sine": (rows.row_of(rows.SIN, links), links),
+            "cosine": (rows.row_of(rows.COS, links), links),
             "command": (first, self.thrusters),
             "force": (first + self.thrusters, self.thrusters),
         }
@@ -226,9 +231,11 @@ class PlanarWorld(World):
             `velocity` of the centre of mass, m/s, (size, 2); `disturbance`, its acceleration less
             that by the thrusters over the mass, f / m_t of (23), m/s^2, (size, 2).
         """
-        turned = np.where(self.robot.thruster_is_normal, 0.5 * np.pi, 0.0)
-        angle, force = read("theta")[:, self.robot.thruster_links] + turned, read("force")
-        push = np.stack([(force * np.cos(angle)).sum(axis=1), (force * np.sin(angle)).sum(axis=1)])
+        along, across = read("push_along"), read("push_across")
+        s, c = read("sine"), read("cosine")
+        push = np.stack(
+            [(along * c - across * s).sum(axis=1), (along * s + across * c).sum(axis=1)]
+        )
         return {
             "coefficients": read("coefficients"),
             "water_velocity": read("water_velocity"),

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from support import oracle
 
-from usm_gym import Robot, Scenario
+from usm_gym import Conditions, Robot, Scenario
 from usm_gym.plant import layout
 from usm_gym.simulation import Simulation
 
@@ -122,7 +122,7 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
         ahead,
         np.concatenate([torque, mean_thrust]),
         current,
-        conditions.hydrodynamics,
+        conditions,
         lead,
         joint_inertia,
     )
@@ -191,7 +191,7 @@ def accelerations(
     moment: Moment,
     inputs: Array,
     current: Array,
-    hydrodynamics: str,
+    conditions: Conditions,
     lead: float,
     joint_inertia: float,
 ) -> tuple[Array, Array]:
@@ -207,16 +207,17 @@ def accelerations(
     v_t = np.einsum("ic,ic->i", body.t, V)
     v_n = np.einsum("ic,ic->i", body.n, V)
 
-    slope_t = lead * c_t * (1.0 + 2.0 * np.abs(v_t))
-    slope_n = lead * c_n * (1.0 + 2.0 * np.abs(v_n))
-    slope_yaw = lead * (lambda_2 + 2.0 * lambda_3 * np.abs(omega))
-    F_t = -c_t * (v_t + v_t * np.abs(v_t))
-    F_n = -c_n * (v_n + v_n * np.abs(v_n))
-    N = -lambda_2 * omega - lambda_3 * omega * np.abs(omega)
+    linear = 0.0 if conditions.drag == "quadratic" else 1.0
+    slope_t = lead * c_t * (linear + 2.0 * np.abs(v_t))
+    slope_n = lead * c_n * (linear + 2.0 * np.abs(v_n))
+    slope_yaw = lead * (linear * lambda_2 + 2.0 * lambda_3 * np.abs(omega))
+    F_t = -c_t * (linear * v_t + v_t * np.abs(v_t))
+    F_n = -c_n * (linear * v_n + v_n * np.abs(v_n))
+    N = -linear * lambda_2 * omega - lambda_3 * omega * np.abs(omega)
     F_t += slope_t * np.einsum("ic,ic->i", body.t, moment.link_ddot)
     F_n += slope_n * np.einsum("ic,ic->i", body.n, moment.link_ddot)
     N += slope_yaw * moment.theta_ddot
-    if hydrodynamics == "consistent":
+    if conditions.hydrodynamics == "consistent":
         F_t += mu * v_n * omega
         F_n += mu * v_t * omega
         N -= mu * v_t * v_n

@@ -34,9 +34,10 @@ def relative_error(actual: Moment, expected: Moment, before: Moment) -> float:
 
 @pytest.mark.parametrize("hydrodynamics", ["consistent", "kelasidi2014"])
 @pytest.mark.parametrize("integrator", ["midpoint", "explicit"])
+@pytest.mark.parametrize("drag", ["linear and quadratic", "quadratic"])
 @pytest.mark.parametrize("links", [2, 3, 8, 9, 10, 16, 17])
 def test_one_step_agrees_with_the_dense_oracle(
-    links: int, integrator: str, hydrodynamics: str
+    links: int, drag: str, integrator: str, hydrodynamics: str
 ) -> None:
     # Rough: lag, saturation, a current that changes, a coefficient of its own for every effect.
     robot = swimmer(links)
@@ -46,8 +47,9 @@ def test_one_step_agrees_with_the_dense_oracle(
         control_period=ROUGH.physics_step,
         integrator=integrator,
         hydrodynamics=hydrodynamics,
+        drag=drag,
     )
-    for _ in range(20):
+    for _ in range(10):
         scenario = sample("operation", conditions, rng, robot)
         before = dense_step.random_moment(robot, rng, scenario.steps)
         action = rng.uniform(-1.5, 1.5, len(robot.thrusters)).astype(np.float32)
