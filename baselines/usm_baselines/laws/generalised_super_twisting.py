@@ -64,7 +64,7 @@ class GeneralisedGains(NamedTuple):
     surface: float = SLOPE
     linear: float = LINEAR
     heading_gain: float = HEADING_GAIN
-    k_1: float = Gain(0.02, "(m/s)^(1/2)/s", "gain of the proportional half", tuned=ALPHA_START)
+    k_1: float = Gain(0.02, "(m/s)^(1/2)/s", "gain of the proportional half", tuned=(1e-4, 100.0))
     k_2: float = Gain(0.015, "m/s^2", "gain of the integral half", tuned=BETA_OFFSET)
 
 
