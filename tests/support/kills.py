@@ -74,7 +74,6 @@ def shrink():
     scores.TRANSFER = {"still": plans.TRANSFER["still"]}
     dissection.SEGMENT, dissection.LONGEST_SHIFT = 16, 2
     registry._entries["sta"] = replace(registry._entries["sta"], space=SPACE)
-    tuning.Problem = partial(tuning.Problem, first_episodes=1)
     tuned = tuning.sample
     tuning.sample = lambda *of: brief(tuned(*of))
     frozen = [brief(each) for each in suite(MAIN)[:4]]
