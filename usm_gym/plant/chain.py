@@ -58,6 +58,15 @@ class Plant(NamedTuple):
 
 
 @piece
+def directions(block, wide, stride, links):
+    """Sines and cosines of the angles now, in the place of those where forces are taken."""
+    for i in range(0, links, stride):
+        s, c = sincos(load(block, row_of(THETA, links) + i, wide))
+        store(block, row_of(SIN, links) + i, s)
+        store(block, row_of(COS, links) + i, c)
+
+
+@piece
 def kinematics(block, like, wide, stride, plant):
     """Where forces are taken: sines and cosines of the angles, rates, velocities of the links.
 

@@ -13,7 +13,7 @@ from usm_baselines.laws.pd import PDGains, pd_force
 from usm_baselines.laws.super_twisting import SuperTwistingGains, super_twisting_force
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
-from usm_gym.plant.chain import kinematics
+from usm_gym.plant.chain import directions, kinematics
 from usm_gym.plant.layout import *
 from usm_gym.plant.step import move_water, physics_step
 from usm_gym.plant.thrusters import allocate, allocation_matrix, saturated
@@ -223,10 +223,8 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
         )
         position, rate, acceleration = (p_x, p_y), (v_x, v_y), (a_x, a_y)
         error[0], error[1] = row[P_X] - p_x, row[P_Y] - p_y
-        if plant.moving_water:
-            move_water(block, 0.0, plant)
-        base = kinematics(block, 0.0, wide, WIDTH, plant)
         if step % plant.substeps == 0:
+            directions(block, wide, WIDTH, links)
             instant = step // plant.substeps
             measured = noise[min(instant, noise.shape[0] - 1)]
             for axis in range(error.size):
@@ -247,6 +245,9 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
             write_down(
                 record, step // every, t, position, error, force, commands, theta, surface, state
             )
+        if plant.moving_water:
+            move_water(block, 0.0, plant)
+        base = kinematics(block, 0.0, wide, WIDTH, plant)
         physics_step(block, 0.0, wide, WIDTH, plant, base)
         n = step // every
         record.joint_torque[n] = max(record.joint_torque[n], largest_torque(row, links))
