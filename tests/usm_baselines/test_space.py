@@ -68,9 +68,10 @@ def test_a_law_is_registered_with_the_space_that_it_declares(
 def test_where_a_value_lies_in_a_range() -> None:
     log, linear = Range(1e-2, 1e2, "1"), Range(0.0, 4.0, "1", log=False)
     for span, middle in ((log, 1.0), (linear, 2.0)):
-        assert span.middle == pytest.approx(middle)
-        places = [span.place(value) for value in (span.low, span.middle, span.high)]
-        assert places == pytest.approx([0.0, 0.5, 1.0])
+        values = [span.low, middle, span.high]
+        assert [span.at(place) for place in (0.0, 0.5, 1.0)] == pytest.approx(values)
+        assert [span.place(value) for value in values] == pytest.approx([0.0, 0.5, 1.0])
+        assert span.at(1.0) <= span.high
 
 
 def test_laws_with_the_same_gain_look_for_it_in_the_same_range() -> None:
