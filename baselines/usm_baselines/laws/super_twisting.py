@@ -30,7 +30,7 @@ from usm_gym.task.nominal import Nominal
 
 # Where the gains of the sliding variable and of the adaptation are tuned, in every law.
 SURFACE, EPSILON, BETA_OFFSET = (0.1, 20.0), (1e-4, 1.0), (1e-4, 1.0)
-OMEGA, DEAD_ZONE, ALPHA_START = (1e-4, 1.0), (1e-5, 0.3), (1e-4, 10.0)
+OMEGA, DEAD_ZONE, ALPHA_START = (1e-4, 1.0), (1e-5, 0.3), (1e-4, 30.0)
 
 
 class SuperTwistingGains(NamedTuple):
