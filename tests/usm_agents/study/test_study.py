@@ -20,13 +20,14 @@ from usm_agents.study.results import CurvePoint, StudyResult
 from usm_agents.study.scores import best_so_far, steps_to
 from usm_agents.study.trainings import planned
 
+import usm_gym
 from usm_cli.program import main
 from usm_gym.evaluation import Evaluation
 from usm_gym.statistics import interval, ratio_interval
 from usm_gym.support.files import write_json
 from usm_gym.task.conditions import FIELD
 
-STORED = Path(__file__).parents[3] / "results" / "0.1.0" / "study" / "study.json"
+STORED = Path(__file__).parents[3] / "results" / usm_gym.__version__ / "study" / "study.json"
 
 
 @pytest.fixture(autouse=True)
