@@ -28,6 +28,8 @@ from usm_gym.task.scenario import Scenario
 
 MAIN = "operation"
 STILL = "operation, joints still"
+# The policies with the paper's gains.
+PAPER = ("sta", "pd")
 
 
 @validated
@@ -272,6 +274,17 @@ def ranks(order: Sequence[Evaluation]) -> list[int | None]:
             first = index
         places.append(first + 1)
     return places
+
+
+def best_of_laws(rows: Mapping[str, Standing]) -> dict[str, Standing]:
+    """Of rows, best first: every law with its best gains, and those of the paper.
+
+    A law that is told the lag is not another law here.
+    """
+    best: dict[str, str] = {}
+    for id in rows:
+        best.setdefault(id.removesuffix("-tuned").removesuffix("-lag"), id)
+    return {id: row for id, row in rows.items() if id in best.values() or id in PAPER}
 
 
 def standing(

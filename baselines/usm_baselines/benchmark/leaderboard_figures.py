@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from usm_baselines.benchmark.leaderboard import LeaderboardResult, Standing
+from usm_baselines.benchmark.leaderboard import LeaderboardResult, Standing, best_of_laws
 from usm_baselines.benchmark.results import axes_in
 from usm_gym.statistics import performance_profile
 from usm_gym.task.metrics import MAX_ERROR
@@ -40,10 +40,10 @@ def draw_all(result: LeaderboardResult, folder: Path) -> None:
 
 
 def _errors(result: LeaderboardResult) -> Any:
-    """Mean error of every policy on every suite, with its interval."""
+    """Mean error of every law on every suite, with its interval."""
     from matplotlib import pyplot as plt
 
-    names, axes = list(result.main), result.axes
+    names, axes = list(best_of_laws(result.main)), result.axes
     height = 0.25 * len(names) + 1.2
     figure, panels = plt.subplots(
         *(len(result.suites), len(axes)),
@@ -69,6 +69,7 @@ def _errors(result: LeaderboardResult) -> Any:
 
 def _profiles(rows: Mapping[str, Standing]) -> Any:
     """Share of episodes with an error up to a threshold."""
+    rows = best_of_laws(rows)
     figure, panels = _panels(rows, 5, sharey=True)
     for axis, panel in panels.items():
         errors = {
@@ -93,9 +94,10 @@ def _profiles(rows: Mapping[str, Standing]) -> Any:
 
 def _variation(result: LeaderboardResult) -> Any:
     """Error against thrust variation, and the fronts of the tuned laws."""
-    figure, panels = _panels(result.main, 6)
+    rows = best_of_laws(result.main)
+    figure, panels = _panels(rows, 6)
     for axis, panel in panels.items():
-        for number, (name, row) in enumerate(result.main.items()):
+        for number, (name, row) in enumerate(rows.items()):
             variation = row.metrics["thrust_variation"].mean
             if variation > 0:
                 error = 1e3 * row.errors[axis].mean

@@ -8,7 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from usm_baselines.benchmark.leaderboard import Lead, LeaderboardResult, Standing
+from usm_baselines.benchmark.leaderboard import Lead, LeaderboardResult, Standing, best_of_laws
 from usm_baselines.benchmark.results import Summary, attitude_in, axes_in, rms_in
 from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.support.text import degrees, figures, listed, mm
@@ -16,8 +16,6 @@ from usm_gym.support.validation import require
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
 MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
-# Whose gains are kept in the README beside better ones: the paper's.
-PAPER = ("sta", "pd")
 # Marks a policy about whose scores there is a note.
 MARK = "†"
 # Metrics without columns in the CSV file.
@@ -58,21 +56,14 @@ def table(rows: Mapping[str, Standing]) -> str:
 
 
 def brief_table(rows: Mapping[str, Standing]) -> str:
-    """The README's table: every law with its best gains, and the paper's, in fewer columns.
-
-    A law that is told the lag is not another law here.
-    """
+    """The README's table: the rows of `best_of_laws`, in fewer columns."""
     axes, angles = axes_in(rows.values()), attitude_in(rows.values())
     rms_axes = " / ".join(rms_in(rows.values()))
     columns = ["told", *(f"{axis}, mm" for axis in axes), f"rms {rms_axes}"]
     columns += [f"worst {' / '.join(axes)}", *(f"{angle}, °" for angle in angles)]
     lines = _head([*columns, "variation, N/s", "lost"])
-    places, laws = rank_labels(rows), set()
-    for id, row in rows.items():
-        law = id.removesuffix("-tuned").removesuffix("-lag")
-        if law in laws and id not in PAPER:
-            continue
-        laws.add(law)
+    places = rank_labels(rows)
+    for id, row in best_of_laws(rows).items():
         errors = row.errors.values()
         rms = " / ".join(mm(error.mean) for error in row.rms.values())
         worst = " / ".join(mm(error.worst) for error in errors)
