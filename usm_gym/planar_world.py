@@ -131,7 +131,7 @@ class PlanarWorld(World):
         `position`, `velocity` and `acceleration` are those of the centre of mass, `force` has the
         thrusters' forces, which lag behind `command`, `coefficients` the true hydrodynamic ones;
         joint i is asked for `joint_shares[i] * deflection`. `acceleration`, what pushes the links,
-        and `sine` and `cosine` of their angles are of the middle of the last physics step.
+        `sine` and `cosine` of their angles and the water are of the middle of the last step.
         """
         links = self.links
         first = rows.first_command(links)

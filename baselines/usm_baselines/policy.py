@@ -71,6 +71,8 @@ class ScriptedPolicy:
         self._world, self._model = world_of(nominal.robot), model_of(nominal, lag)
         # Before the law's own numbers stand those that all laws share.
         self._own = shared_size(self._model)
+        # Laws of the planar robot model the lag themselves.
+        require(not (lag and self.planar), "lag", lag, "False for a law that models it")
         fitting = isinstance(nominal.robot, Robot) or not self.planar
         require(fitting, "robot", nominal.robot, "the planar robot")
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.compile import compiled, piece, shared
 from usm_gym.plant.thrusters import allocate, lag_shares
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import World, world_of
@@ -176,6 +176,7 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
                 state[b, 1 + axis * model.thrusters + j] = T[axis, j]
 
 
+@shared
 def shared_size(model: Model) -> int:
     """How many numbers of a policy's state `sense` and `act` keep, before the law's own."""
     return 1 + (model.axes + 1) * model.thrusters

@@ -107,15 +107,16 @@ def table(result: EvaluationResult) -> Table:
     where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
     rows = empty_table(
         "policy",
-        numbers=(*headings, "variation\nN/s", "lost"),
+        numbers=(*headings, "variation\nN/s", "objective\nmm", "lost"),
         title=f"largest position error after settling, mm: mean [95 % interval] ({where})",
     )
-    for name, row in result.results.items():
+    ordered = sorted(result.results.items(), key=lambda pair: pair[1].objective)
+    for name, row in ordered:
         errors, rms = row.errors.values(), row.rms.values()
         cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
         cells += [mm(e.worst) for e in errors] + [mm(e.mean) for e in rms]
         cells += [degrees(e.mean) for e in row.attitude.values()]
-        cells.append(figures(row.metrics["thrust_variation"].mean))
+        cells += [figures(row.metrics["thrust_variation"].mean), figures(row.objective)]
         rows.add_row(f"{name} {MARK}" if row.note else name, *cells, str(row.failures))
     notes = {row.note for row in result.results.values() if row.note}
     rows.caption = "; ".join(f"{MARK} {note}" for note in sorted(notes)) or None

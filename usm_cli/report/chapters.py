@@ -102,7 +102,7 @@ def chapter(result: Result, choice: Choice, progress: Progress) -> Chapter:
 def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> Chapter:
     """Several policies on one list of scenarios."""
     name, scenarios = result.suite or "sampled", result.scenarios
-    rows = by_total(result.results)
+    rows = by_objective(result.results)
     return Chapter(
         title=f"Evaluation: {name}",
         lead=f"{len(rows)} policies on {len(scenarios)} episodes.",
@@ -236,7 +236,7 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     for name, row in everyone.items():
         for kind, scores in row.scores.items():
             tables.setdefault(f"{row.mode}, {kind}", {})[name] = scores
-    home = by_total(
+    home = by_objective(
         {
             name: row.scores[result.home]
             for name, row in everyone.items()
@@ -275,8 +275,8 @@ CHAPTERS: dict[type[Result], Callable[[Any, Choice, Progress], Chapter]] = {
 }
 
 
-def by_total(rows: Mapping[str, Scores]) -> dict[str, Scores]:
-    """Sort rows by their error, the smallest first."""
+def by_objective(rows: Mapping[str, Scores]) -> dict[str, Scores]:
+    """Sort rows by the objective, the smallest first."""
     return dict(sorted(rows.items(), key=lambda pair: pair[1].objective))
 
 

@@ -61,6 +61,8 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
     axes = axes_in(rows.values())
     columns = [
         Column("policy"),
+        Column("told"),
+        Column("objective, mm"),
         *(Column(f"error {axis}, mm") for axis in axes),
         Column(f"{listed(axes)} on one scale, mm" if axes else "error", scale.ticks, axes),
         *(Column(f"middle half {axis}") for axis in axes),
@@ -76,7 +78,9 @@ def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> Sorta
     for name, row in rows.items():
         errors = row.errors
         halves = [interquartile_mean(row.per_episode[MAX_ERROR + axis]) for axis in axes]
-        cells = [Cell(name, name, remark(row))]
+        told = row.told if isinstance(row, CompetitorScores) else ""
+        cells = [Cell(name, name, remark(row)), Cell(told, told)]
+        cells.append(Cell(figures(row.objective), row.objective))
         cells += [Cell(mm(e.mean), e.mean, interval(e)) for e in errors.values()]
         cells.append(Cell("", row.objective, marks=scale.marks(errors)))
         cells += [length(float(half)) for half in halves]

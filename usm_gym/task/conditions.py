@@ -16,9 +16,12 @@ LARGEST_CURRENT = 5.0
 # What a control period costs at most, which nothing can interrupt.
 MOST_SUBSTEPS = 10_000
 
+# Beyond these nothing is worth simulating: control periods, and s.
+LARGEST_DELAY, LARGEST_TIME_CONSTANT = 100, 100.0
+
 Coefficient = Annotated[Number, Field(ge=0.01, le=100)]
 Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
-Delay = Annotated[int, Strict(), Field(ge=0, le=100)]
+Delay = Annotated[int, Strict(), Field(ge=0, le=LARGEST_DELAY)]
 FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
 
 
@@ -55,7 +58,7 @@ class Conditions:
     integrator: Literal["midpoint", "explicit"] = "midpoint"
     hydrodynamics: Hydrodynamics = "consistent"
     drag: Drag = "linear and quadratic"
-    thruster_time_constant: Annotated[Number, Field(ge=0, le=100)] = 0.05
+    thruster_time_constant: Annotated[Number, Field(ge=0, le=LARGEST_TIME_CONSTANT)] = 0.05
     thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0
     position_noise: Annotated[Number, Field(ge=0, le=1)] = 5e-5
     position_delay: Delay = 0

@@ -194,7 +194,10 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
 
 
 def told_with(base: str) -> str:
-    """What an agent on a base policy is told besides the measured position and the reference."""
+    """What an agent on a base policy is told besides the measured position and the reference.
+
+    What an agent was trained without, by its `omit`, is not left out here.
+    """
     known = entry(base).told.split(", ")
     return ", ".join(dict.fromkeys([*TOLD, *(each for each in known if each != POSITION_ONLY)]))
 
@@ -210,9 +213,9 @@ def agent_contender(folder: str) -> Contender:
     sources = fingerprint("usm_gym", "usm_baselines", "usm_agents")
     description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
     identity = json.dumps([agent.weights, description, sources])
-    return Contender(
-        folder, partial(make_agent, folder=folder), told=told_with(agent.base), identity=identity
-    )
+    factory, told = partial(make_agent, folder=folder), told_with(agent.base)
+    note = note_of(agent.training)
+    return Contender(folder, factory, told=told, note=note, identity=identity)
 
 
 def register_shipped() -> None:
@@ -227,5 +230,7 @@ def register_shipped() -> None:
 
 def note_of(training: Mapping[str, Any]) -> str:
     """What to bear in mind about an agent of such a training."""
-    version = training["provenance"]["version"]
-    return f"trained on the plant of {version}" if older_plant(version) else ""
+    said = training.get("provenance")
+    version = said.get("version") if isinstance(said, Mapping) else None
+    known = isinstance(version, str) and older_plant(version)
+    return f"trained on the plant of {version}" if known else ""

@@ -66,8 +66,8 @@ class Standing(CompetitorScores):
 
     Attributes:
         metrics: Summaries by metric, for the largest errors with the middle half.
-        rank: Its place: that of the first row from which the data do not tell it; None if it is
-            no competitor.
+        rank: The place of the first row from which the data do not tell it, its own if they tell it
+            from all before; None if it is no competitor.
         beats_next: Its lead over the next row; None before a row that is no competitor, and last.
     """
 
@@ -266,13 +266,15 @@ def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing
 
 
 def ranks(order: Sequence[Evaluation]) -> list[int | None]:
-    """The places of rows, best first; those that the data do not tell from the first share it."""
+    """The ranks of rows, best first: see `Standing.rank`."""
     places: list[int | None] = []
-    first = 0
     for index, scores in enumerate(order):
-        if index and compare(order[first].objective(), scores.objective()).decided:
-            first = index
-        places.append(first + 1)
+        tied = (
+            place
+            for place, better in enumerate(order[:index])
+            if not compare(better.objective(), scores.objective()).decided
+        )
+        places.append(next(tied, index) + 1)
     return places
 
 

@@ -25,10 +25,10 @@ Largest position error after settling, mm: mean over the episodes with its 95 % 
 the middle half of the episodes, worst episode; root mean square, mm; largest heading error, °.
 "Told" is what a policy knows besides the measured position and the reference. Rows are ordered by
 the objective by which gains and agents are chosen: the means in {axes} added up, plus {attitude} mm
-per degree of heading error and {variation} mm per N/s of thrust variation. Rows of one rank are
-those that the data do not tell from the first of them. "Beats the next" says whether the interval
-of the paired difference to the next row leaves out 0, and with what probability an episode goes
-better.
+per degree of heading error and {variation} mm per N/s of thrust variation. The rank of a row is the
+place of the first row from which the data do not tell it. "Beats the next" says whether the
+interval of the paired difference to the next row leaves out 0, and with what probability an episode
+goes better.
 """
 
 
@@ -127,7 +127,7 @@ def with_table(page: str, result: LeaderboardResult) -> str:
 def csv_text(result: LeaderboardResult) -> str:
     """One line per policy and suite; errors in m and rad, thrust in N, variation in N/s."""
     scores = [name for name in next(iter(result.main.values())).metrics if name not in NO_COLUMN]
-    head = ["suite", "policy", "told", "competitor", "failures"]
+    head = ["suite", "rank", "policy", "told", "competitor", "objective", "failures"]
     for name in scores:
         head += [name, f"{name}_low", f"{name}_high", f"{name}_worst"]
     out = io.StringIO()
@@ -135,7 +135,8 @@ def csv_text(result: LeaderboardResult) -> str:
     writer.writerow(head)
     for suite, rows in result.suites.items():
         for id, row in rows.items():
-            line: list[object] = [suite, id, row.told, row.competitor, row.failures]
+            line: list[object] = [suite, row.rank, id, row.told, row.competitor]
+            line += [row.objective, row.failures]
             for name in scores:
                 summary = row.metrics[name]
                 line += [summary.mean, *summary.ci95, summary.worst]

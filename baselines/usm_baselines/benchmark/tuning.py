@@ -41,7 +41,7 @@ from usm_gym.support import parallel
 from usm_gym.support.files import holding
 from usm_gym.support.seeding import TUNING, VALIDATION, stream
 from usm_gym.support.validation import UsageError, in_one_line, require
-from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.conditions import FIELD, LARGEST_DELAY, LARGEST_TIME_CONSTANT, Conditions
 from usm_gym.task.metrics import VARIATION_WEIGHT
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.sampling import sample
@@ -116,8 +116,10 @@ class Problem:
         file = GainsFile(self.policy, gains, self.budget, self.weight)
         contender = registered(self.policy, tuned(file))
         told = self.scenarios(purpose)
+        # The last of fewer scenarios, so that a short search has a margin, too.
+        every = min(MARGIN_EVERY, len(told))
         met = [
-            later(scenario) if episode % MARGIN_EVERY == MARGIN_EVERY - 1 else scenario
+            later(scenario) if episode % every == every - 1 else scenario
             for episode, scenario in enumerate(told)
         ]
         return Job(contender, tuple(met), shared_nominal(told))
@@ -145,20 +147,24 @@ def later(scenario: Scenario) -> Scenario:
     conditions = scenario.conditions
     changed = replace(
         conditions,
-        action_delay=conditions.action_delay + MARGIN_DELAY,
-        thruster_time_constant=MARGIN_LAG * conditions.thruster_time_constant,
+        action_delay=min(conditions.action_delay + MARGIN_DELAY, LARGEST_DELAY),
+        thruster_time_constant=min(
+            MARGIN_LAG * conditions.thruster_time_constant, LARGEST_TIME_CONSTANT
+        ),
     )
     return replace(scenario, conditions=changed)
 
 
 def objective(outcome: Evaluation | Refusal, weight: float = VARIATION_WEIGHT) -> float:
-    """Mean of the objective over the episodes, mm; a refusal costs more than any loss.
+    """Mean of the objective over the episodes, mm; no more than that of a refusal.
 
     Args:
         outcome: Scores, or a refusal.
         weight: Cost of thrust variation, mm per N/s.
     """
-    return FAILED if isinstance(outcome, Refusal) else float(np.mean(outcome.objective(weight)))
+    if isinstance(outcome, Refusal):
+        return FAILED
+    return min(float(np.mean(outcome.objective(weight))), FAILED)
 
 
 def tune(
@@ -195,7 +201,8 @@ def tune(
         best, value = dict(chosen.params), value_of(chosen)
         reason = chosen.user_attrs.get(REFUSED)
     if value >= FAILED:
-        raise UsageError(f"no trial of {problem.policy} has a score: {reason}")
+        why = reason or "every robot is lost"
+        raise UsageError(f"no trial of {problem.policy} has a score: {why}")
     checks = [problem.job(gains, VALIDATION) for gains in ({}, best)]
     start, validation = (
         objective(outcome, problem.weight) for outcome in score_all(checks, workers)
@@ -233,7 +240,8 @@ def _search(
     distributions: dict[str, BaseDistribution] = {
         name: FloatDistribution(span.low, span.high, log=span.log) for name, span in space.items()
     }
-    values = [value_of(trial) for trial in study.get_trials(deepcopy=False)]
+    known = study.get_trials(deepcopy=False)
+    values = [value_of(trial) for trial in known]
     progress(len(values), min(values, default=float("nan")))
     optimizer = CMA(
         mean=np.full(len(space), 0.5),
@@ -245,6 +253,10 @@ def _search(
     for first in range(0, trials, GENERATION):
         places = [optimizer.ask() for _ in range(GENERATION)]
         # Of a tuning that goes on, trials are known; they only have to be told again.
+        for trial, each in zip(known[first : first + GENERATION], places, strict=False):
+            same = [span.place(trial.params[name]) for name, span in space.items()]
+            allowed = "those that this machine and this version of cmaes ask for"
+            require(np.allclose(same, each, atol=1e-6), "stored trials", trial.params, allowed)
         asked = [
             {name: span.at(place) for (name, span), place in zip(space.items(), each, strict=True)}
             for each in places[len(values) - first : trials - first]

@@ -21,7 +21,7 @@ def estimate_all(state, model, linear, signals, estimates, innovation):
     """Sense, filter both axes, keep what the next call needs; see `Estimator.update`."""
     sense(state, model, signals)
     thrusters = model.thrusters
-    first = state.shape[1] - model.axes * kalman.STATES
+    first = shared_size(model)
     for b in range(innovation.shape[0]):
         state[b, 0] = 1.0
         for axis in range(model.axes):
