@@ -27,7 +27,7 @@ def test_an_evaluation(axes, tmp_path, monkeypatch, capsys):
     result = evaluation(axes, ("pd", "sta"), SCENARIOS)
     headings = [column.header for column in evaluate.table(result).columns]
     places = [f"{what}{axis}" for what in ("", "worst ", "rms ") for axis in axes]
-    assert headings == ["policy", *places, "variation\nN/s", "lost"]
+    assert headings == ["policy", *places, "variation\nN/s", "objective\nmm", "lost"]
     result.write("result.json")
     main(["report", "result.json", "--output", "page.html"])
     text = (tmp_path / "page.html").read_text()
