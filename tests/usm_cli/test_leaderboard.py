@@ -67,7 +67,7 @@ def test_the_leaderboard_is_the_same_with_one_and_two_workers(
     assert len(lines) == 6
     assert float(lines[0]["max_error_x"]) == next(iter(rows.values()))["max_error_x"]["mean"]
     page = (folder / "page.md").read_text()
-    assert page.startswith("before\n<!-- leaderboard -->\n| policy |")
+    assert page.startswith("before\n<!-- leaderboard -->\n| | policy |")
     assert page.endswith("after\n")
     result = board.LeaderboardResult.read(folder / "1" / "leaderboard.json")
     assert page[7:-6] == leaderboard_page.readme_block(result)

@@ -380,7 +380,7 @@ def test_plots_zoom_and_tell_by_keys(browser, folder, varied):
 @pytest.mark.slow
 def test_tables_sort_both_ways_by_keys(browser, folder):
     show(browser, folder / "page.html")
-    for column, selector in ((0, "tbody th"), (1, "tbody td:nth-child(2)")):
+    for column, selector in ((0, "tbody th"), (2, "tbody td:nth-child(3)")):
         head = f".scroll thead th:nth-child({column + 1})"
         found = []
         for order in ("ascending", "descending"):
