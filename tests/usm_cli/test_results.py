@@ -21,7 +21,8 @@ from usm_baselines.paper.reproduction_fit import (
     declared,
     seen,
 )
-from usm_baselines.paper.sensitivity import Outcome, SensitivityResult, planned_result, trials
+from usm_baselines.paper.sensitivity import planned_result, trials
+from usm_baselines.paper.sensitivity_result import Outcome, SensitivityResult
 
 from usm_cli.program import main
 from usm_cli.speed import SpeedResult

@@ -13,10 +13,9 @@ from usm_baselines.paper.sensitivity import (
     ROWS,
     SENSORS_AND_THRUSTERS,
     STARTS,
-    Outcome,
-    SensitivityResult,
     variations,
 )
+from usm_baselines.paper.sensitivity_result import Outcome, SensitivityResult
 
 MARKERS = "oxs^"
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from usm_baselines.paper import sensitivity
 from usm_baselines.paper.sensitivity import case_of, planned_result, study, trials, variations
+from usm_baselines.paper.sensitivity_result import SensitivityResult
 
 from usm_gym.plant import thrusters
 from usm_gym.robot import Robot
@@ -76,7 +77,7 @@ def test_an_interrupted_study_goes_on_and_ends_as_one_that_was_not(tmp_path):
     whole = study(path, 2, lambda done, total: calls.append((done, total)), short_trials())
     assert calls[0][1] > calls[-1][1]  # there was less to do
     assert whole == study(tmp_path / "other.json", 2, lambda done, total: None, short_trials())
-    assert sensitivity.SensitivityResult.read(path) == whole
+    assert SensitivityResult.read(path) == whole
     assert all(run.result.peak_force > 0 for run in whole.runs)
 
 
