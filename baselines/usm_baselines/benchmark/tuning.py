@@ -49,9 +49,11 @@ from usm_gym.task.scenario import Mode, Scenario
 
 # Trials of a generation, and the first standard deviation of the search over the width of a range.
 GENERATION, SPREAD = 8, 0.2
-# In every so many-th scenario commands take effect a period late and thrusters lag more, by a
-# factor; the policy is not told.
-MARGIN_EVERY, MARGIN_DELAY, MARGIN_LAG = 8, 1, 1.3
+# In every so many-th scenario the vehicle reacts later than the policy is told. By turns, commands
+# take effect so many periods late, and the thrusters lag more by a factor. Each alone is needed: a
+# longer lag makes up for late commands in a law that knows the lag.
+MARGIN_EVERY = 8
+MARGINS = ((1, 1.0), (0, 1.3), (1, 1.3))
 # Objective of a trial that has no score, mm.
 FAILED = 1e4
 # Objectives that are this close to the best are as good; of these trials the one is taken whose
@@ -99,6 +101,7 @@ class Problem:
         """Name of the study: another problem, or other code, never continues it."""
         identity = registered(self.policy, entry(self.policy)).identity
         parts = {**dataclasses.asdict(self), "budget": self.budget.episodes, "code": identity}
+        parts["margins"] = [MARGIN_EVERY, *MARGINS]
         parts["space"] = {name: dataclasses.asdict(span) for name, span in self.space.items()}
         text = json.dumps(parts, sort_keys=True)
         return f"{self.policy}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
@@ -118,10 +121,9 @@ class Problem:
         told = self.scenarios(purpose)
         # The last of fewer scenarios, so that a short search has a margin, too.
         every = min(MARGIN_EVERY, len(told))
-        met = [
-            later(scenario) if episode % every == every - 1 else scenario
-            for episode, scenario in enumerate(told)
-        ]
+        met = list(told)
+        for turn, episode in enumerate(range(every - 1, len(told), every)):
+            met[episode] = later(told[episode], *MARGINS[turn % len(MARGINS)])
         return Job(contender, tuple(met), shared_nominal(told))
 
 
@@ -142,15 +144,13 @@ class Optimum:
     validation: float
 
 
-def later(scenario: Scenario) -> Scenario:
-    """The same scenario, in which the vehicle reacts later."""
+def later(scenario: Scenario, periods: int, lag: float) -> Scenario:
+    """The same scenario, with commands some periods later and a lag longer by a factor."""
     conditions = scenario.conditions
     changed = replace(
         conditions,
-        action_delay=min(conditions.action_delay + MARGIN_DELAY, LARGEST_DELAY),
-        thruster_time_constant=min(
-            MARGIN_LAG * conditions.thruster_time_constant, LARGEST_TIME_CONSTANT
-        ),
+        action_delay=min(conditions.action_delay + periods, LARGEST_DELAY),
+        thruster_time_constant=min(lag * conditions.thruster_time_constant, LARGEST_TIME_CONSTANT),
     )
     return replace(scenario, conditions=changed)
 
