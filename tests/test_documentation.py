@@ -21,6 +21,7 @@ BUDGETS = {
     "usm policies": "",
     "usm evaluate": "--mode operation --episodes 2",
     "usm compare": "--mode operation --episodes 2",
+    "usm robustness --vary delay": "--values 0,1 --episodes 2",
     "usm robustness": "--values 0.05 --episodes 2",
     "usm tune": "--trials 2 --episodes 2",
     "usm leaderboard": "--policies zero --workers 1",
