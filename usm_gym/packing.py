@@ -81,6 +81,6 @@ def body_row(
     side = rows.row_of(rows.SIDE, links)
     row[side : side + links] = rows.sides(links)
     row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(filter_frequency, plant.h)
-    row[rows.SHIFT_TIME : rows.SHIFT_SIZE] = rows.NEVER
+    row[rows.SHIFT_STEP : rows.SHIFT_SIZE] = rows.NEVER
     row[rows.LAG], row[rows.MEAN_LAG] = lag_shares(time_constant, plant.h)
     return row

@@ -193,7 +193,8 @@ class PlanarWorld(World):
         share = rows.row_of(rows.SHARE, links) + links - 1 - motion.bending_joints
         row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
         shifts = len(scenario.shifts)
-        row[rows.SHIFT_TIME : rows.SHIFT_TIME + shifts] = scenario.shifts
+        at = np.divide(scenario.shifts, conditions.physics_step)
+        row[rows.SHIFT_STEP : rows.SHIFT_STEP + shifts] = at
         sizes = np.diff(motion.deflections, prepend=0.0)[:shifts]
         row[rows.SHIFT_SIZE : rows.SHIFT_SIZE + shifts] = sizes
         row[rows.LIMIT] = conditions.thruster_limit

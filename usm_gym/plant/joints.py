@@ -60,7 +60,7 @@ def advance_references(block, like, shifts, h, lead):
     target, at_end = like, like
     for k in range(shifts):
         size = load(block, SHIFT_SIZE + k, like)
-        share = end - load(block, SHIFT_TIME + k, like) / h
+        share = end - load(block, SHIFT_STEP + k, like)
         begun = share > EARLIEST
         target += where(begun, where(share < 1.0, share, 1.0) * size, like)
         at_end += where(begun, size, like)

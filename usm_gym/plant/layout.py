@@ -34,11 +34,12 @@ FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = r
 # Thrusters: share of the way to the command that a physics step covers by its end and in its mean,
 # and the limit.
 LAG, MEAN_LAG, LIMIT = range(36, 39)
-# Times of the changes of the deflection (`NEVER` where there is none), then their sizes.
+# When the deflection changes, in physics steps since the start (`NEVER` where it does not), and by
+# how much.
 NEVER = 1e30
 MAX_SHIFTS = 8
-SHIFT_TIME = 39
-SHIFT_SIZE = SHIFT_TIME + MAX_SHIFTS
+SHIFT_STEP = 39
+SHIFT_SIZE = SHIFT_STEP + MAX_SHIFTS
 HEADER = SHIFT_SIZE + MAX_SHIFTS
 
 # Quantities of the links. State: angle and rate. Fixed in an episode: the share of the deflection

@@ -75,7 +75,7 @@ def nominal_plant(nominal: Nominal) -> NominalPlant:
         filter_frequency=REFERENCE_FREQUENCY,
         time_constant=nominal.thruster_time_constant,
     )
-    row[SHIFT_TIME] = -1.0
+    row[SHIFT_STEP] = -1.0
     layout = world_of(robot).layout
     return NominalPlant(plant, row, REFERENCE_FREQUENCY, layout.starts, layout.scale, period)
 
