@@ -48,7 +48,7 @@ from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
 # Trials of a generation, and the first standard deviation of the search over the width of a range.
-GENERATION, SPREAD = 8, 0.2
+GENERATION, SPREAD = 16, 0.3
 # In every so many-th scenario the vehicle reacts later than the policy is told. By turns, commands
 # take effect so many periods late, and the thrusters lag more by a factor. Each alone is needed: a
 # longer lag makes up for late commands in a law that knows the lag.
