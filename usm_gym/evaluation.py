@@ -195,7 +195,7 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
     else:
         values = [
             metrics.max_error(time, error, settle),
-            metrics.settled_error(time, error, scenario.shifts, settle),
+            metrics.settled_error(time, error, scenario.shifts, settle, _recovery(scenario)),
             metrics.rms_error(time, error, settle),
         ]
         row = dict(zip(names, np.concatenate(values).tolist(), strict=True))
@@ -209,6 +209,11 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
         "saturation_share": metrics.saturation_share(trajectory.command, limit),
         FAILED: trajectory.lost,
     }
+
+
+def _recovery(scenario: Any) -> float:
+    scan = scenario.conditions.shift_gap_range is not None
+    return metrics.SCAN_RECOVERY if scan else metrics.RECOVERY
 
 
 class _Recording:

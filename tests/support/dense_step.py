@@ -255,5 +255,5 @@ class _Rows:
 
     def forces(self) -> Array:
         thrusters = len(self.robot.thrusters)
-        first = layout.first_command(self.robot.links) + thrusters
+        first = layout.thruster_row(layout.FORCE, self.robot.links, thrusters)
         return self.row[first : first + thrusters]

@@ -22,6 +22,7 @@ from usm_gym.planar_world import PlanarWorld
 from usm_gym.plant.chain import Plant
 from usm_gym.plant.layout import *
 from usm_gym.plant.step import advance
+from usm_gym.plant.thrusters import delivered
 from usm_gym.robot import Robot
 from usm_gym.sensors import value
 from usm_gym.support.validation import require
@@ -74,6 +75,7 @@ def nominal_plant(nominal: Nominal) -> NominalPlant:
         plant,
         filter_frequency=REFERENCE_FREQUENCY,
         time_constant=nominal.thruster_time_constant,
+        dead_band=nominal.thruster_dead_band,
     )
     row[SHIFT_STEP] = -1.0
     layout = world_of(robot).layout
@@ -139,11 +141,13 @@ def place(seen, nominal, state, applied, block, lane):
         block[(WATER_AX + axis) * WIDTH + lane] = d
     place_references(seen, nominal, block, lane)
     limit = value(applied, nominal, ENTRY.thruster_limit, 0)
-    first = first_command(links)
+    forces = thruster_row(FORCE, links, thrusters)
+    targets = thruster_row(TARGET, links, thrusters)
     for j in range(thrusters):
         command = value(applied, nominal, ENTRY.thruster_command, j) * limit
-        block[(first + j) * WIDTH + lane] = command
-        block[(first + thrusters + j) * WIDTH + lane] = state[ESTIMATES + j]
+        target = delivered(command, 1.0, nominal.row[DEAD_BAND])
+        block[(targets + j) * WIDTH + lane] = target
+        block[(forces + j) * WIDTH + lane] = state[ESTIMATES + j]
 
 
 @compiled
@@ -188,6 +192,7 @@ def place_all(observation, nominal, state, past, blocks):
 def update(observation, started, nominal, correction, blocks, state):
     """Bring the state of a batch to the present, from its blocks and the measured position."""
     thrusters = nominal.plant.thruster_links.size
+    forces = thruster_row(FORCE, nominal.plant.links, thrusters)
     for b in range(observation.shape[0]):
         seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         before = own[ESTIMATES + thrusters :]
@@ -205,8 +210,7 @@ def update(observation, started, nominal, correction, blocks, state):
                 estimate[1] = v + correction[axis, 1] * (y - e)
                 estimate[2] += correction[axis, 2] * (y - e)
         for j in range(thrusters):
-            row = first_command(nominal.plant.links) + thrusters + j
-            own[ESTIMATES + j] = block[row * WIDTH + lane] if started[b] > 0.0 else 0.0
+            own[ESTIMATES + j] = block[(forces + j) * WIDTH + lane] if started[b] > 0.0 else 0.0
         before[:] = seen
 
 
