@@ -55,9 +55,7 @@ def observe(fleet, plant, table, robot, lanes):
     measured = seen[0] + noise[0], seen[1] + noise[1]
     others, angles = fleet.other_noise[robot, now], fleet.attitude_error[robot]
     observation = fleet.observation[robot]
-    measure(
-        row, lanes, lane, plant, reference, measured, others[AXES:], table, angles, observation
-    )
+    measure(row, lanes, lane, plant, reference, measured, others[AXES:], table, angles, observation)
     period = plant.substeps * plant.h
     measure_age(ENTRY.position_age, (now - at) * period, table, observation)
     at = fleet.taken[robot, now, 1]
@@ -65,7 +63,10 @@ def observe(fleet, plant, table, robot, lanes):
     observation[k], observation[k + 1] = 0.0, 0.0
     if at >= 0:
         age = (now - at) * period
-        seen, noise_then = past[(instant - (now - at)) % past.shape[0]], fleet.other_noise[robot, at]
+        seen, noise_then = (
+            past[(instant - (now - at)) % past.shape[0]],
+            fleet.other_noise[robot, at],
+        )
         for axis in range(AXES):
             velocity = seen[AXES + axis] + noise_then[axis]
             observation[k + axis] = velocity * table.gain[k + axis]

@@ -196,6 +196,7 @@ def nominal_knowledge(env: Any) -> Nominal:
 
 # What laws are told besides the measured position and the reference.
 LAG = "lag"
+NAVIGATED = "lag, noise, delays, straight body"
 BODY, FORESIGHT = "lag, noise, straight body", "lag, noise, nominal plant, joint references"
 
 register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
@@ -242,6 +243,17 @@ for _id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "ladrc", "smc
         partial(_law.factory, lag=True),
         f"{_id}, told the thrusters' lag",
         told=LAG,
+        space=_law.space,
+        on_request=True,
+    )
+# The paper's first case (9), and others with it: position and velocity from the navigator.
+for _id in ("sta", "pd", "pid", "smc"):
+    _law = _entries[_id]
+    register(
+        f"{_id}-navigator",
+        partial(_law.factory, navigated=True),
+        f"{_id} on the navigator's position and velocity",
+        told=NAVIGATED,
         space=_law.space,
         on_request=True,
     )

@@ -65,9 +65,7 @@ def settled_error(
     return np.asarray(np.abs(errors[late]).max(axis=0))
 
 
-def shift_errors(
-    time: ArrayLike, error: ArrayLike, shifts: Sequence[float]
-) -> NDArray[np.float64]:
+def shift_errors(time: ArrayLike, error: ArrayLike, shifts: Sequence[float]) -> NDArray[np.float64]:
     """Largest absolute error from every change of the joint references to the next.
 
     Args:

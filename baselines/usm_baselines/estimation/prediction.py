@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_baselines.estimation import kalman
+from usm_baselines.estimation.navigator import Navigator, is_needed, navigate
 from usm_baselines.signals import Array, Signals, commanded
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
@@ -188,30 +190,61 @@ def place_all(observation, nominal, state, past, blocks):
             place(seen, nominal, own, seen, block, lane)
 
 
-@compiled
-def update(observation, started, nominal, correction, blocks, state):
-    """Bring the state of a batch to the present, from its blocks and the measured position."""
+@piece
+def predicted(seen, before, started, nominal, block, lane, axis, estimate):
+    """Fill in (e, v, d) of an axis as the block predicts it for now; at the start, as measured."""
+    if started == 0.0:
+        y = value(seen, nominal, ENTRY.position_error, axis)
+        rate = -value(seen, nominal, ENTRY.reference_velocity, axis)
+        estimate[0], estimate[1], estimate[2] = y, rate, 0.0
+    else:
+        e, v = error_ahead(before, nominal, nominal.h, axis, block, lane)
+        estimate[0], estimate[1] = e, v
+
+
+@piece
+def note(seen, started, nominal, block, lane, own):
+    """Keep the thrusters' forces and the observation of a robot for the next period."""
     thrusters = nominal.plant.thruster_links.size
     forces = thruster_row(FORCE, nominal.plant.links, thrusters)
-    for b in range(observation.shape[0]):
-        seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
-        before = own[ESTIMATES + thrusters :]
+    for j in range(thrusters):
+        own[ESTIMATES + j] = block[(forces + j) * WIDTH + lane] if started > 0.0 else 0.0
+    for k in range(seen.size):
+        own[ESTIMATES + thrusters + k] = seen[k]
+
+
+@compiled
+def update(signals, nominal, correction, blocks, state):
+    """Bring the state of a batch to the present, by the stationary filter of gain `correction`."""
+    last = ESTIMATES + nominal.plant.thruster_links.size
+    for b in range(signals.observation.shape[0]):
+        seen, own, block, lane = signals.observation[b], state[b], blocks[b // WIDTH], b % WIDTH
+        started = signals.started[b]
         for axis in range(AXES):
-            y, estimate = (
-                value(seen, nominal, ENTRY.position_error, axis),
-                own[3 * axis : 3 * axis + 3],
-            )
-            if started[b] == 0.0:
-                rate = -value(seen, nominal, ENTRY.reference_velocity, axis)
-                estimate[0], estimate[1], estimate[2] = y, rate, 0.0
-            else:
-                e, v = error_ahead(before, nominal, nominal.h, axis, block, lane)
-                estimate[0] = e + correction[axis, 0] * (y - e)
-                estimate[1] = v + correction[axis, 1] * (y - e)
-                estimate[2] += correction[axis, 2] * (y - e)
-        for j in range(thrusters):
-            own[ESTIMATES + j] = block[(forces + j) * WIDTH + lane] if started[b] > 0.0 else 0.0
-        before[:] = seen
+            estimate = own[3 * axis : 3 * axis + 3]
+            predicted(seen, own[last:], started, nominal, block, lane, axis, estimate)
+            if started > 0.0 and signals.fresh[b]:
+                off = value(seen, nominal, ENTRY.position_error, axis) - estimate[0]
+                for i in range(3):
+                    estimate[i] += correction[axis, i] * off
+        note(seen, started, nominal, block, lane, own)
+
+
+@compiled
+def update_late(signals, nominal, nav, blocks, state):
+    """The same by the filter `nav` of `navigator`, whose memory comes last in the state."""
+    last = ESTIMATES + nominal.plant.thruster_links.size
+    estimate = np.empty((AXES, 3))
+    for b in range(signals.observation.shape[0]):
+        seen, own, block, lane = signals.observation[b], state[b], blocks[b // WIDTH], b % WIDTH
+        started = signals.started[b]
+        for axis in range(AXES):
+            estimate[axis] = own[3 * axis : 3 * axis + 3]
+            predicted(seen, own[last:], started, nominal, block, lane, axis, estimate[axis])
+        navigate(seen, nav, started, estimate, own[last + seen.size :])
+        for axis in range(AXES):
+            own[3 * axis : 3 * axis + 3] = estimate[axis]
+        note(seen, started, nominal, block, lane, own)
 
 
 @compiled
@@ -236,31 +269,41 @@ class Predictor:
     """Estimates where the robots of a batch are, and foresees where they will be.
 
     Its state is an array of numbers for each robot: (e, v, d) of each axis, the forces of the
-    thrusters in N, the last observation.
+    thrusters in N, the last observation, and where positions come late or rarely, the memory of a
+    navigator.
 
     Attributes:
         size: How many numbers that is.
     """
 
-    def __init__(self, nominal: Nominal, correction: Array) -> None:
-        """Keep the nominal robot.
+    def __init__(
+        self, nominal: Nominal, acceleration_noise: float, disturbance_noise: float
+    ) -> None:
+        """Keep the nominal robot, and set up the filter.
 
         Args:
             nominal: Nominal knowledge.
-            correction: Gains of the filter on (e, v, d), (2, 3).
+            acceleration_noise: Spectral density of what drives v, m/s^2 / sqrt(Hz).
+            disturbance_noise: Spectral density of what drives d, m/s^3 / sqrt(Hz).
 
         Raises:
-            ValueError: If the robot is not the planar one.
+            ValueError: If the robot is not the planar one, or a density is not above 0.
         """
-        self._nominal, self._correction = nominal_plant(nominal), correction
+        self._nominal = nominal_plant(nominal)
+        densities = acceleration_noise, disturbance_noise
+        self._correction = kalman.linear_model(nominal, *densities).correction
+        self._navigator = Navigator(nominal, *densities) if is_needed(nominal) else None
         self.size = ESTIMATES + len(nominal.robot.thrusters) + self._nominal.scale.size
+        self.size += self._navigator.size if self._navigator else 0
 
     def estimate(self, signals: Signals, state: Array) -> None:
         """Bring the state, (batch, size), to the present, in place."""
         blocks = self._blocks(signals, state, past=True)
         advance_all(blocks, self._nominal.plant)
-        seen, started = signals.observation, signals.started
-        update(seen, started, self._nominal, self._correction, blocks, state)
+        if self._navigator is None:
+            update(signals, self._nominal, self._correction, blocks, state)
+        else:
+            update_late(signals, self._nominal, self._navigator.constants, blocks, state)
 
     def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
         """Where estimated robots go if their last commands are held.

@@ -87,12 +87,13 @@ class JointLQG(LQG):
 
     Gains = JointLQGGains
     state = prediction.NAMES
+    linear = False
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
-        self._predictor = Predictor(nominal, self._linear.correction)
+        self._predictor = Predictor(nominal, *self.densities)
 
     @cached_property
     def law_shape(self) -> tuple[int, ...]:

@@ -107,12 +107,11 @@ class MPC(ScriptedPolicy):
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
-        linear = kalman.linear_model(
-            nominal, self.gains.acceleration_noise, self.gains.disturbance_noise
-        )
+        densities = self.gains.acceleration_noise, self.gains.disturbance_noise
+        linear = kalman.linear_model(nominal, *densities)
         self._periods = max(1, round(self.gains.horizon / nominal.control_period))
         self._inertia = linear.inertia
-        self._predictor = Predictor(nominal, linear.correction)
+        self._predictor = Predictor(nominal, *densities)
         weights = self.gains.variation_weight * linear.inertia
         self._gain = np.stack(
             [
