@@ -9,10 +9,12 @@ from functools import partial
 from typing import Any
 
 from usm_baselines.gains import TUNED, GainsFile, read_gains
+from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
 from usm_baselines.laws.generalised_super_twisting import (
     AdaptiveGeneralisedSuperTwisting,
     GeneralisedSuperTwisting,
 )
+from usm_baselines.laws.informed_lqg import InformedLQG
 from usm_baselines.laws.joint_lqg import JointLQG
 from usm_baselines.laws.ladrc import LADRC
 from usm_baselines.laws.lqg import LQG
@@ -268,6 +270,19 @@ register(
     JointLQG,
     "the same with the joint motion foreseen by the nominal plant",
     told=FORESIGHT,
+)
+register(
+    "adaptive",
+    AdaptiveLQG,
+    "the same, with coefficients, current and thruster gains identified on the way",
+    told=FORESIGHT,
+)
+register(
+    "informed",
+    InformedLQG,
+    "lqg-joints, told what is constant in an episode: what identification could bring",
+    told="all constants of the episode",
+    privileged=True,
 )
 register("mpc", MPC, "predictive control on the nominal plant, joint motion known", told=FORESIGHT)
 register(

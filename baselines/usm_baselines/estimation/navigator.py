@@ -1,13 +1,14 @@
 """Where the robot is, from fixes that come late, rarely, or not at all.
 
-In each axis a Kalman filter on (e, v, d) of `kalman`, with the covariance as it is at every instant:
-between fixes it grows. A measurement is taken in at the time at which it was made. For that, what
-was predicted since the oldest measurement that can still arrive is kept; a correction then goes on
-from there through the linear model, and so do the measurements that came after it. On the linear
-model that is the estimate that the same measurement without delay would have given.
+A Kalman filter on (e, v, d) of `kalman` in each axis, and on what else a law lets it estimate, with
+the covariance as it is at every instant: between fixes it grows. A measurement is taken in at the
+time at which it was made. For that, what was predicted since the oldest measurement that can still
+arrive is kept; a correction then goes on from there through the linearised model, and so do the
+measurements that came after it. On a linear model that is the estimate that the same measurement
+without delay would have given.
 
 What predicts is up to the law: the linear model (`Navigator.estimate`), or the nominal plant
-(`prediction`).
+(`prediction`, `identification`).
 
 Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and
 Navigation, 2001, chapter 5 (filter and its consistency).
@@ -15,15 +16,16 @@ Navigation, 2001, chapter 5 (filter and its consistency).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from usm_baselines.estimation import kalman
-from usm_baselines.estimation.kalman import DISTURBANCE, ERROR, RATE, THRUST, Linear
+from usm_baselines.estimation.kalman import DISTURBANCE, ERROR, RATE, THRUST
 from usm_baselines.signals import Signals
-from usm_gym.kernels.compile import compiled, piece
+from usm_gym.kernels.compile import compiled, piece, shared
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
 
@@ -32,31 +34,34 @@ Array = NDArray[np.float64]
 # Spectral densities of what drives v (m/s^2 / sqrt(Hz)) and d (m/s^3 / sqrt(Hz)), for laws that do
 # not have them among their gains.
 ACCELERATION_NOISE, DISTURBANCE_NOISE = 2e-2, 0.02
-# What the filter estimates in an axis, and for how long the disturbance of the start has had to
-# grow, s.
-STATES = 3
-UNKNOWN_FOR = 10.0
-# Memory of a robot: control periods since the start; innovation, m, and its variance, m^2, of the
-# fix that has arrived, by axis, the variance 0 if none has; (e, v, d, f) by axis; then slots.
+# Numbers that are estimated in an axis, (e, v, d); for how long the disturbance of the start has
+# had to grow, s.
+STATES, UNKNOWN_FOR = 3, 10.0
+# Memory of a robot: control periods since the start; for each axis the innovation, m, of the fix
+# that has arrived, and its variance, m^2, 0 if none has; then slots.
 COUNT, INNOVATION = 0, 1
-# A slot holds, of one instant and axis: what was predicted and its covariance, what became of it by
-# the measurements of that instant and its covariance, the measured error and rate with a mark each
-# whether there is one, the velocity of the reference.
-PRIOR, PRIOR_P, POST, POST_P, Y, HAS_Y, V, HAS_V, REFERENCE = 0, 3, 12, 15, 24, 25, 26, 27, 28
-SLOT = 29
+# A slot holds, of one instant, a header for each axis: the measured error and rate, with a mark each
+# whether there is one, and the velocity of the reference. Then of the whole: what was predicted,
+# its covariance, what became of it by the measurements of that instant, its covariance, and how it
+# follows from the instant before.
+Y, HAS_Y, V, HAS_V, REFERENCE = range(5)
+MEASURED = 5
 
 
 class Navigation(NamedTuple):
     """The filter in the form that kernels take.
 
+    The first 3 axes numbers that it estimates are (e, v, d) of each axis; others, which stay as
+    they are but for noise, may follow.
+
     Attributes:
         axes: Axes of the position.
+        size: Numbers that are estimated.
         slots: Instants that are remembered.
-        transition: (e, v, d) from (e, v, d) over a period, (axes, 3, 3).
-        noise: Covariance that a period adds, (axes, 3, 3).
+        noise: Covariance that a period adds, (size, size).
+        start: Covariance of the start, (size, size).
         position_variance: Variance of a fix, m^2.
         velocity_variance: Variance of a measured velocity, m^2/s^2.
-        start_variance: Variance of (e, v, d) at the start, (3,).
         h: Control period, s.
         position_delay: Control periods after which a fix arrives.
         velocity_delay: The same of a velocity; -1 if nothing measures it.
@@ -69,12 +74,12 @@ class Navigation(NamedTuple):
     """
 
     axes: int
+    size: int
     slots: int
-    transition: Array
     noise: Array
+    start: Array
     position_variance: float
     velocity_variance: float
-    start_variance: Array
     h: float
     position_delay: int
     velocity_delay: int
@@ -86,6 +91,17 @@ class Navigation(NamedTuple):
     reference_velocity: int
 
 
+class Slot(NamedTuple):
+    """Where the parts of a slot begin in the memory."""
+
+    measured: int
+    prior: int
+    prior_covariance: int
+    post: int
+    post_covariance: int
+    transition: int
+
+
 def is_needed(nominal: Nominal) -> bool:
     """Whether positions come late or rarely, or something measures the velocity.
 
@@ -95,86 +111,104 @@ def is_needed(nominal: Nominal) -> bool:
     return late or nominal.velocity_period is not None
 
 
-@piece
-def slot(nav, instant, axis):
-    """Where the slot of an instant begins in the memory."""
-    first = 1 + 2 * nav.axes + kalman.STATES * nav.axes
-    return first + ((instant % nav.slots) * nav.axes + axis) * SLOT
+@shared
+def slot_size(axes: int, size: int) -> int:
+    """How many numbers a slot has."""
+    return MEASURED * axes + 2 * (size + size * size) + STATES * axes * size
 
 
 @piece
-def take_in(memory, at, index, error, variance):
-    """Correct what a slot's POST holds by a measurement of number `index`, off by `error`."""
-    S = memory[at + POST_P + STATES * index + index] + variance
-    gain_0 = memory[at + POST_P + index] / S
-    gain_1 = memory[at + POST_P + STATES + index] / S
-    gain_2 = memory[at + POST_P + 2 * STATES + index] / S
-    gains = gain_0, gain_1, gain_2
-    row_0 = memory[at + POST_P + STATES * index]
-    row_1 = memory[at + POST_P + STATES * index + 1]
-    row_2 = memory[at + POST_P + STATES * index + 2]
-    rows = row_0, row_1, row_2
-    for i in range(STATES):
-        memory[at + POST + i] += gains[i] * error
-        for j in range(STATES):
-            memory[at + POST_P + STATES * i + j] -= gains[i] * rows[j]
+def slot(nav, instant):
+    """Where the slot of an instant is in the memory."""
+    at = 1 + 2 * nav.axes + (instant % nav.slots) * slot_size(nav.axes, nav.size)
+    prior = at + MEASURED * nav.axes
+    square = nav.size * nav.size
+    post = prior + nav.size + square
+    return Slot(at, prior, prior + nav.size, post, post + nav.size, post + nav.size + square)
+
+
+@piece
+def take_in(nav, memory, at, index, measurement, variance):
+    """Correct what a slot's posterior holds by a measurement of number `index`."""
+    size, P = nav.size, at.post_covariance
+    error = measurement - memory[at.post + index]
+    row = P + size * index
+    S = memory[row + index] + variance
+    for i in range(size):
+        if i != index:
+            gain = memory[P + size * i + index] / S
+            memory[at.post + i] += gain * error
+            for j in range(size):
+                memory[P + size * i + j] -= gain * memory[row + j]
+    # The row itself comes last, because the others need it as it was.
+    gain = memory[row + index] / S
+    memory[at.post + index] += gain * error
+    for j in range(size):
+        memory[row + j] *= 1.0 - gain
 
 
 @piece
 def settle(nav, memory, at):
-    """Fill in POST of a slot from PRIOR and what was measured then."""
-    for i in range(STATES + STATES * STATES):
-        memory[at + POST + i] = memory[at + PRIOR + i]
-    if memory[at + HAS_Y] > 0.0:
-        error = memory[at + Y] - memory[at + POST + ERROR]
-        take_in(memory, at, ERROR, error, nav.position_variance)
-    if memory[at + HAS_V] > 0.0:
-        error = memory[at + V] - memory[at + POST + RATE]
-        take_in(memory, at, RATE, error, nav.velocity_variance)
+    """Fill in the posterior of a slot from what was predicted and what was measured then."""
+    for i in range(nav.size + nav.size * nav.size):
+        memory[at.post + i] = memory[at.prior + i]
+    for axis in range(nav.axes):
+        own, e = at.measured + MEASURED * axis, STATES * axis + ERROR
+        if memory[own + HAS_Y] > 0.0:
+            take_in(nav, memory, at, e, memory[own + Y], nav.position_variance)
+        if memory[own + HAS_V] > 0.0:
+            v = STATES * axis + RATE
+            take_in(nav, memory, at, v, memory[own + V], nav.velocity_variance)
 
 
 @piece
-def carry_covariance(nav, memory, axis, at, following):
-    """Fill in PRIOR_P of the slot that follows another: A P A^T + Q."""
-    A, Q = nav.transition[axis], nav.noise[axis]
-    for i in range(STATES):
-        for j in range(STATES):
-            total = Q[i, j]
-            for k in range(STATES):
-                for m in range(STATES):
-                    total += A[i, k] * memory[at + POST_P + STATES * k + m] * A[j, m]
-            memory[following + PRIOR_P + STATES * i + j] = total
+def carry_covariance(nav, memory, at, following, work):
+    """Fill in the predicted covariance of the slot that follows another: F P F^T + Q.
+
+    Only the first rows of F, those of (e, v, d), are other than those of the identity.
+    """
+    size, moving = nav.size, STATES * nav.axes
+    P, F, new = at.post_covariance, following.transition, following.prior_covariance
+    for i in range(moving):
+        for j in range(size):
+            total = 0.0
+            for k in range(size):
+                total += memory[F + size * i + k] * memory[P + size * k + j]
+            work[i, j] = total
+    for i in range(moving, size):
+        for j in range(moving, size):
+            memory[new + size * i + j] = memory[P + size * i + j] + nav.noise[i, j]
+    for i in range(moving):
+        for j in range(moving, size):
+            memory[new + size * i + j] = work[i, j] + nav.noise[i, j]
+            memory[new + size * j + i] = work[i, j] + nav.noise[i, j]
+        for j in range(moving):
+            total = nav.noise[i, j]
+            for k in range(size):
+                total += work[i, k] * memory[F + size * j + k]
+            memory[new + size * i + j] = total
 
 
 @piece
-def run_on(nav, memory, axis, first, last):
+def run_on(nav, memory, first, last, change, work):
     """Settle the slots of instants `first` to `last`, each on what became of the one before."""
-    A = nav.transition[axis]
+    size, moving = nav.size, STATES * nav.axes
     for instant in range(first, last):
-        at, following = slot(nav, instant, axis), slot(nav, instant + 1, axis)
-        before_0, before_1 = memory[at + POST], memory[at + POST + 1]
-        before_2 = memory[at + POST + 2]
+        at, following = slot(nav, instant), slot(nav, instant + 1)
+        for i in range(size):
+            change[i] = -memory[at.post + i]
         settle(nav, memory, at)
-        change_0 = memory[at + POST] - before_0
-        change_1 = memory[at + POST + 1] - before_1
-        change_2 = memory[at + POST + 2] - before_2
-        for i in range(STATES):
-            change = A[i, 0] * change_0 + A[i, 1] * change_1 + A[i, 2] * change_2
-            memory[following + PRIOR + i] += change
-        carry_covariance(nav, memory, axis, at, following)
-    settle(nav, memory, slot(nav, last, axis))
-
-
-@piece
-def begin(nav, memory, axis, estimate):
-    """Open the memory with the estimate of the start, which has taken in its measurement."""
-    at = slot(nav, 0, axis)
-    for i in range(SLOT):
-        memory[at + i] = 0.0
-    for i in range(STATES):
-        memory[at + PRIOR + i] = estimate[i]
-        memory[at + PRIOR_P + STATES * i + i] = nav.start_variance[i]
-    settle(nav, memory, at)
+        for i in range(size):
+            change[i] += memory[at.post + i]
+        for i in range(size):
+            moved = change[i]
+            if i < moving:
+                moved = 0.0
+                for k in range(size):
+                    moved += memory[following.transition + size * i + k] * change[k]
+            memory[following.prior + i] += moved
+        carry_covariance(nav, memory, at, following, work)
+    settle(nav, memory, slot(nav, last))
 
 
 @piece
@@ -183,98 +217,117 @@ def age_of(seen, nav, entry):
     return round(seen[entry] * nav.scale[entry] / nav.h)
 
 
+@piece
+def open_slot(seen, nav, memory, now, estimate, transition, work):
+    """Begin the slot of this instant with what was predicted for it."""
+    at, size = slot(nav, now), nav.size
+    for axis in range(nav.axes):
+        own, k = at.measured + MEASURED * axis, nav.reference_velocity + axis
+        memory[own + HAS_Y], memory[own + HAS_V] = 0.0, 0.0
+        memory[own + REFERENCE] = seen[k] * nav.scale[k]
+    for i in range(size):
+        memory[at.prior + i] = estimate[i]
+        for j in range(size):
+            if i < STATES * nav.axes:
+                memory[at.transition + size * i + j] = transition[i, j]
+            if now == 0:
+                memory[at.prior_covariance + size * i + j] = nav.start[i, j]
+    if now > 0:
+        carry_covariance(nav, memory, slot(nav, now - 1), at, work)
+
+
 @compiled
-def navigate(seen, nav, started, estimate, memory):
+def navigate(seen, nav, started, transition, estimate, memory):
     """Take in what has arrived at this instant.
 
     Args:
         seen: Observation of a robot.
         nav: The filter.
         started: 0.0 at the first call of an episode.
-        estimate: (e, v, d) as predicted for now, (axes, 3); becomes the estimate.
+        transition: (e, v, d) of all axes from all that is estimated, over the period that has
+            passed, (3 axes, size).
+        estimate: What is estimated, as predicted for now, (size,); becomes the estimate.
         memory: What is kept of the robot.
     """
     now = 0 if started == 0.0 else int(memory[COUNT]) + 1
     memory[COUNT] = now
+    work, change = np.empty((STATES * nav.axes, nav.size)), np.empty(nav.size)
+    open_slot(seen, nav, memory, now, estimate, transition, work)
     # The measurement of the start has been taken in, and is no news when it is seen again.
     fix = now > nav.position_delay and age_of(seen, nav, nav.position_age) == nav.position_delay
     speed = nav.velocity_delay >= 0 and now > nav.velocity_delay
     speed = speed and age_of(seen, nav, nav.velocity_age) == nav.velocity_delay
     first = now
-    if fix:
-        first = min(first, now - nav.position_delay)
-    if speed:
-        first = min(first, now - nav.velocity_delay)
     for axis in range(nav.axes):
-        memory[INNOVATION + 2 * axis], memory[INNOVATION + 2 * axis + 1] = 0.0, 0.0
-        at = slot(nav, now, axis)
-        if now == 0:
-            begin(nav, memory, axis, estimate[axis])
-        else:
-            for i in range(STATES):
-                memory[at + PRIOR + i] = estimate[axis, i]
-            carry_covariance(nav, memory, axis, slot(nav, now - 1, axis), at)
-            memory[at + HAS_Y], memory[at + HAS_V] = 0.0, 0.0
-        k = nav.reference_velocity + axis
-        memory[at + REFERENCE] = seen[k] * nav.scale[k]
+        innovation = INNOVATION + 2 * axis
+        memory[innovation], memory[innovation + 1] = 0.0, 0.0
         if fix:
-            then, k = slot(nav, now - nav.position_delay, axis), nav.position_error + axis
-            memory[then + Y], memory[then + HAS_Y] = seen[k] * nav.scale[k], 1.0
-            memory[INNOVATION + 2 * axis] = memory[then + Y] - memory[then + PRIOR]
-            variance = memory[then + PRIOR_P] + nav.position_variance
-            memory[INNOVATION + 2 * axis + 1] = variance
+            first = min(first, now - nav.position_delay)
+            then, k = slot(nav, now - nav.position_delay), nav.position_error + axis
+            own, e = then.measured + MEASURED * axis, STATES * axis + ERROR
+            memory[own + Y], memory[own + HAS_Y] = seen[k] * nav.scale[k], 1.0
+            memory[innovation] = memory[own + Y] - memory[then.prior + e]
+            variance = memory[then.prior_covariance + nav.size * e + e]
+            memory[innovation + 1] = variance + nav.position_variance
         if speed:
-            then, k = slot(nav, now - nav.velocity_delay, axis), nav.velocity + axis
-            memory[then + V] = seen[k] * nav.scale[k] - memory[then + REFERENCE]
-            memory[then + HAS_V] = 1.0
-        run_on(nav, memory, axis, first, now)
-        for i in range(STATES):
-            estimate[axis, i] = memory[at + POST + i]
+            first = min(first, now - nav.velocity_delay)
+            then, k = slot(nav, now - nav.velocity_delay), nav.velocity + axis
+            own = then.measured + MEASURED * axis
+            memory[own + V] = seen[k] * nav.scale[k] - memory[own + REFERENCE]
+            memory[own + HAS_V] = 1.0
+    run_on(nav, memory, first, now, change, work)
+    at = slot(nav, now)
+    for i in range(nav.size):
+        estimate[i] = memory[at.post + i]
 
 
 @compiled
-def estimate_all(signals, mass, linear, nav, memory):
+def estimate_all(signals, mass, linear, nav, transition, thrust, memory):
     """One period of the filter on the linear model, for a batch; fills in the signals.
 
     Args:
-        signals: Signals, whose error, rate and disturbance become the estimates.
+        signals: Signals, whose error, rate, disturbance and thrust become the estimates.
         mass: Total mass m_t, kg.
         linear: The linear model.
         nav: The filter.
-        memory: What is kept, (batch, size).
+        transition: As of `navigate`, on the linear model.
+        thrust: Thrust over the inertia, m/s^2, (batch, axes), moved on in place.
+        memory: What is kept, (batch, numbers).
     """
-    estimate, own = np.empty((nav.axes, STATES)), np.empty(kalman.STATES)
+    estimate, own = np.empty(nav.size), np.empty(kalman.STATES)
     for b in range(signals.y.shape[0]):
-        first = 1 + 2 * nav.axes
+        started, now = signals.started[b], slot(nav, int(memory[b, COUNT]))
         for axis in range(nav.axes):
-            at = first + kalman.STATES * axis
+            first = STATES * axis
             last, known = kalman.inputs(signals, mass, linear, b, axis)
-            own[:] = memory[b, at : at + kalman.STATES]
-            if signals.started[b] == 0.0:
+            if started == 0.0:
                 kalman.start(signals.y[b, axis], signals.velocity[b, axis], own)
             else:
+                for i in range(STATES):
+                    own[i] = memory[b, now.post + first + i]
+                own[THRUST] = thrust[b, axis]
                 kalman.predict(linear.transition[axis], last, known, own)
-            memory[b, at + THRUST] = own[THRUST]
-            estimate[axis] = own[:STATES]
-        navigate(signals.observation[b], nav, signals.started[b], estimate, memory[b])
+            thrust[b, axis] = own[THRUST]
+            for i in range(STATES):
+                estimate[first + i] = own[i]
+        navigate(signals.observation[b], nav, started, transition, estimate, memory[b])
         for axis in range(nav.axes):
-            at = first + kalman.STATES * axis
-            memory[b, at : at + STATES] = estimate[axis]
-            signals.y[b, axis] = estimate[axis, ERROR]
-            signals.rate[b, axis] = estimate[axis, RATE]
-            signals.disturbance[b, axis] = estimate[axis, DISTURBANCE]
-            signals.thrust[b, axis] = memory[b, at + THRUST]
+            first = STATES * axis
+            signals.y[b, axis] = estimate[first + ERROR]
+            signals.rate[b, axis] = estimate[first + RATE]
+            signals.disturbance[b, axis] = estimate[first + DISTURBANCE]
+            signals.thrust[b, axis] = thrust[b, axis]
 
 
 class Navigator:
-    """Estimates error, rate and disturbance of a batch of robots.
+    """Estimates error, rate and disturbance of a batch of robots on the linear model.
 
     Like a policy it keeps nothing itself: its memory, an array of numbers for each robot, travels
     with the caller.
 
     Attributes:
         size: How many numbers that is.
-        constants: The filter, for kernels that predict by themselves and call `navigate`.
+        constants: The filter, for kernels.
     """
 
     def __init__(
@@ -291,9 +344,9 @@ class Navigator:
             ValueError: If a density is not above 0, or the robot is not the planar one.
         """
         self._linear = kalman.linear_model(nominal, acceleration_noise, disturbance_noise)
-        self.constants = navigation(nominal, self._linear, acceleration_noise, disturbance_noise)
-        axes = self.constants.axes
-        self.size = 1 + (2 + kalman.STATES + self.constants.slots * SLOT) * axes
+        self.constants = navigation(nominal, acceleration_noise, disturbance_noise)
+        self._transition = transition_of(self._linear, self.constants.size)
+        self.size = self.constants.axes + memory_size(self.constants)
 
     def estimate(self, signals: Signals, mass: float, memory: Array) -> None:
         """Predict by the linear model and take in what has arrived, in place.
@@ -304,53 +357,93 @@ class Navigator:
             mass: Total mass, kg.
             memory: Memory of the batch, (batch, size); zero at the start.
         """
-        estimate_all(signals, mass, self._linear, self.constants, memory)
+        nav, thrust, kept = self.constants, *self._parts(memory)
+        estimate_all(signals, mass, self._linear, nav, self._transition, thrust, kept)
 
     def innovation(self, memory: Array) -> tuple[Array, Array]:
         """Innovation of the fixes that have arrived, m, and its variance, m^2, (batch, axes).
 
         The variance is 0 where none has.
         """
-        axes = self.constants.axes
-        pairs = memory[:, INNOVATION : INNOVATION + 2 * axes].reshape(-1, axes, 2)
+        axes, (_, kept) = self.constants.axes, self._parts(memory)
+        pairs = kept[:, INNOVATION : INNOVATION + 2 * axes].reshape(-1, axes, 2)
         return pairs[:, :, 0], pairs[:, :, 1]
 
     def covariance(self, memory: Array) -> Array:
-        """Covariance of the estimates of (e, v, d), (batch, axes, 3, 3)."""
-        nav, count = self.constants, memory[:, COUNT].astype(np.int64)
-        first = 1 + (2 + kalman.STATES) * nav.axes
-        slots = memory[:, first:].reshape(len(memory), nav.slots, nav.axes, SLOT)
-        now = slots[np.arange(len(memory)), count % nav.slots]
-        return now[:, :, POST_P : POST_P + STATES**2].reshape(-1, nav.axes, STATES, STATES)
+        """Covariance of the estimates of (e, v, d), axis by axis, (batch, 3 axes, 3 axes)."""
+        return covariance(self.constants, self._parts(memory)[1])
+
+    def _parts(self, memory: Array) -> tuple[Array, Array]:
+        """Thrust over the inertia, and the memory of `navigate`."""
+        return memory[:, : self.constants.axes], memory[:, self.constants.axes :]
+
+
+def covariance(nav: Navigation, memory: Array) -> Array:
+    """Covariance of what is estimated of a batch, (batch, size, size)."""
+    rows = []
+    for own in memory:
+        first = slot.py_func(nav, int(own[COUNT])).post_covariance
+        rows.append(own[first : first + nav.size**2].reshape(nav.size, nav.size))
+    return np.stack(rows)
+
+
+def memory_size(nav: Navigation) -> int:
+    """How many numbers `navigate` keeps of a robot."""
+    return 1 + 2 * nav.axes + nav.slots * slot_size(nav.axes, nav.size)
+
+
+def transition_of(linear: kalman.Linear, size: int) -> Array:
+    """(e, v, d) of all axes over a period on the linear model, (3 axes, size)."""
+    axes = len(linear.transition)
+    transition = np.zeros((STATES * axes, size))
+    for axis in range(axes):
+        own = slice(STATES * axis, STATES * (axis + 1))
+        transition[own, own] = linear.transition[axis, :STATES, :STATES]
+    return transition
 
 
 def navigation(
-    nominal: Nominal, linear: Linear, acceleration_noise: float, disturbance_noise: float
+    nominal: Nominal,
+    acceleration_noise: float,
+    disturbance_noise: float,
+    more: Sequence[tuple[float, float]] = (),
 ) -> Navigation:
-    """The filter for kernels; arguments as of `Navigator`."""
-    world = world_of(nominal.robot)
-    first = {name: place.start for name, place in world.layout.slices.items()}
+    """The filter for kernels; arguments as of `Navigator`.
+
+    Args:
+        nominal: Nominal knowledge.
+        acceleration_noise: Spectral density of what drives v, m/s^2 / sqrt(Hz).
+        disturbance_noise: Spectral density of what drives d, m/s^3 / sqrt(Hz).
+        more: Standard deviation at the start and spectral density, in the unit over sqrt(s), of
+            what else is estimated.
+    """
+    world, h = world_of(nominal.robot), nominal.control_period
+    layout = world.layout
+    first = {name: place.start for name, place in layout.slices.items()}
     measures = nominal.velocity_period is not None
     velocity_delay = nominal.velocity_delay if measures else -1
     fix = max(nominal.position_noise, kalman.SMALLEST_NOISE) ** 2
-    h = nominal.control_period
+    inertia, drag = kalman.straight_body(nominal.robot)
+    size = STATES * len(inertia) + len(more)
+    noise, start = np.zeros((size, size)), np.zeros((size, size))
+    for axis, damping in enumerate(drag / inertia):
+        own = slice(STATES * axis, STATES * (axis + 1))
+        noise[own, own] = kalman.process_noise(damping, h, acceleration_noise, disturbance_noise)
+        start[own, own] = np.diag([fix, 0.0, disturbance_noise**2 * UNKNOWN_FOR])
+    for k, (deviation, density) in enumerate(more, STATES * len(inertia)):
+        start[k, k], noise[k, k] = deviation**2, h * density**2
     return Navigation(
-        axes=len(world.axes),
+        axes=len(inertia),
+        size=size,
         slots=1 + max(nominal.position_delay, velocity_delay, 1),
-        transition=np.ascontiguousarray(linear.transition[:, :STATES, :STATES]),
-        noise=np.stack(
-            [
-                kalman.process_noise(damping, h, acceleration_noise, disturbance_noise)
-                for damping in linear.damping
-            ]
-        ),
+        noise=noise,
+        start=start,
         position_variance=fix,
         velocity_variance=max(nominal.velocity_noise, kalman.SMALLEST_NOISE) ** 2,
-        start_variance=np.array([fix, 0.0, disturbance_noise**2 * UNKNOWN_FOR]),
         h=h,
         position_delay=nominal.position_delay,
         velocity_delay=velocity_delay,
-        scale=world.layout.scale,
+        scale=layout.scale,
         position_error=first["position_error"],
         position_age=first["position_age"],
         velocity=first["velocity"],

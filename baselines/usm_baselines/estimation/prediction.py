@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_baselines.estimation import kalman
-from usm_baselines.estimation.navigator import Navigator, is_needed, navigate
+from usm_baselines.estimation.navigator import (
+    is_needed,
+    memory_size,
+    navigate,
+    navigation,
+    transition_of,
+)
 from usm_baselines.signals import Array, Signals, commanded
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
@@ -37,6 +43,9 @@ from usm_gym.world import world_of
 AXES = len(PlanarWorld.axes)
 NAMES = ("error", "rate", "unmodelled")
 ESTIMATES = AXES * len(NAMES)
+# A belief about a robot: true over nominal coefficients, the current in m/s, then the force of each
+# thruster over its command, then the coefficients of each link over those common to all.
+COEFFICIENTS, CURRENT, THRUSTER_GAINS = 0, 6, 8
 # Physics steps of a prediction in a control period.
 SUBSTEPS = 5
 # The frequency that is assumed of the joint references' filter, rad/s.
@@ -112,7 +121,7 @@ def place_references(seen, nominal, block, lane):
 
 
 @piece
-def place(seen, nominal, state, applied, block, lane):
+def place(seen, nominal, state, applied, belief, block, lane):
     """Put a robot where an observation and the estimates say it is.
 
     Args:
@@ -120,12 +129,18 @@ def place(seen, nominal, state, applied, block, lane):
         nominal: The nominal robot.
         state: State of the predictor, of the time of the observation.
         applied: The observation that tells the commands over the coming period.
+        belief: What it is believed to be.
         block: Block of the robot, (rows * WIDTH,).
         lane: Its place in the block.
     """
     links, thrusters = nominal.plant.links, nominal.plant.thruster_links.size
     for r in range(nominal.row.size):
         block[r * WIDTH + lane] = nominal.row[r]
+    for k in range(CURRENT):
+        block[(C_T + k) * WIDTH + lane] *= belief[COEFFICIENTS + k]
+    for i in range(links):
+        factor = belief[THRUSTER_GAINS + thrusters + i]
+        block[(row_of(FACTOR, links) + i) * WIDTH + lane] = factor
     theta = value(seen, nominal, ENTRY.tail_angle, 0)
     omega = value(seen, nominal, ENTRY.tail_rate, 0)
     for i in range(links):
@@ -141,13 +156,15 @@ def place(seen, nominal, state, applied, block, lane):
         block[(V_X + axis) * WIDTH + lane] = velocity
         # All water accelerating by d accelerates the centre of mass by d and turns nothing.
         block[(WATER_AX + axis) * WIDTH + lane] = d
+        block[(WATER_X + axis) * WIDTH + lane] = belief[CURRENT + axis]
     place_references(seen, nominal, block, lane)
     limit = value(applied, nominal, ENTRY.thruster_limit, 0)
     forces = thruster_row(FORCE, links, thrusters)
     targets = thruster_row(TARGET, links, thrusters)
     for j in range(thrusters):
         command = value(applied, nominal, ENTRY.thruster_command, j) * limit
-        target = delivered(command, 1.0, nominal.row[DEAD_BAND])
+        gain = belief[THRUSTER_GAINS + j]
+        target = delivered(command, gain, nominal.row[DEAD_BAND])
         block[(targets + j) * WIDTH + lane] = target
         block[(forces + j) * WIDTH + lane] = state[ESTIMATES + j]
 
@@ -171,7 +188,7 @@ def error_ahead(seen, nominal, time, axis, block, lane):
 
 
 @compiled
-def place_all(observation, nominal, state, past, blocks):
+def place_all(observation, nominal, state, past, beliefs, blocks):
     """`place` every robot of a batch, lane by lane; lanes that are left over stay idle.
 
     Args:
@@ -179,15 +196,16 @@ def place_all(observation, nominal, state, past, blocks):
         nominal: The nominal robot.
         state: State of the predictor, (batch, size).
         past: Whether to place them as they were a period ago, with the commands known by now.
+        beliefs: What they are believed to be, (batch, numbers).
         blocks: Where to write, (blocks, rows * WIDTH).
     """
     last = ESTIMATES + nominal.plant.thruster_links.size
     for b in range(observation.shape[0]):
         seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         if past:
-            place(own[last:], nominal, own, seen, block, lane)
+            place(own[last:], nominal, own, seen, beliefs[b], block, lane)
         else:
-            place(seen, nominal, own, seen, block, lane)
+            place(seen, nominal, own, seen, beliefs[b], block, lane)
 
 
 @piece
@@ -231,19 +249,19 @@ def update(signals, nominal, correction, blocks, state):
 
 
 @compiled
-def update_late(signals, nominal, nav, blocks, state):
+def update_late(signals, nominal, nav, transition, blocks, state):
     """The same by the filter `nav` of `navigator`, whose memory comes last in the state."""
     last = ESTIMATES + nominal.plant.thruster_links.size
-    estimate = np.empty((AXES, 3))
+    estimate = np.empty(ESTIMATES)
     for b in range(signals.observation.shape[0]):
         seen, own, block, lane = signals.observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         started = signals.started[b]
+        estimate[:] = own[:ESTIMATES]
         for axis in range(AXES):
-            estimate[axis] = own[3 * axis : 3 * axis + 3]
-            predicted(seen, own[last:], started, nominal, block, lane, axis, estimate[axis])
-        navigate(seen, nav, started, estimate, own[last + seen.size :])
-        for axis in range(AXES):
-            own[3 * axis : 3 * axis + 3] = estimate[axis]
+            mine = estimate[3 * axis : 3 * axis + 3]
+            predicted(seen, own[last:], started, nominal, block, lane, axis, mine)
+        navigate(seen, nav, started, transition, estimate, own[last + seen.size :])
+        own[:ESTIMATES] = estimate
         note(seen, started, nominal, block, lane, own)
 
 
@@ -257,11 +275,12 @@ def read_ahead(observation, nominal, time, blocks, ahead):
 
 
 @piece
-def held_force(signals, model, b, axis):
+def held_force(signals, model, belief, b, axis):
     """Force, N, that the last commands of a robot make in an axis, its links being as they are."""
     force = 0.0
     for j in range(model.thrusters):
-        force += signals.allocation[b, axis, j] * commanded(signals.observation[b], model, j)
+        share = signals.allocation[b, axis, j] * belief[THRUSTER_GAINS + j]
+        force += share * commanded(signals.observation[b], model, j)
     return force
 
 
@@ -291,19 +310,27 @@ class Predictor:
         """
         self._nominal = nominal_plant(nominal)
         densities = acceleration_noise, disturbance_noise
-        self._correction = kalman.linear_model(nominal, *densities).correction
-        self._navigator = Navigator(nominal, *densities) if is_needed(nominal) else None
-        self.size = ESTIMATES + len(nominal.robot.thrusters) + self._nominal.scale.size
-        self.size += self._navigator.size if self._navigator else 0
+        self._linear = kalman.linear_model(nominal, *densities)
+        self._filter = navigation(nominal, *densities) if is_needed(nominal) else None
+        links, self._thrusters = nominal.robot.links, len(nominal.robot.thrusters)
+        self._neutral = np.ones(THRUSTER_GAINS + self._thrusters + links)
+        self._neutral[CURRENT:THRUSTER_GAINS] = 0.0
+        self.size = ESTIMATES + self._thrusters + self._nominal.scale.size
+        self.size += memory_size(self._filter) if self._filter else 0
+
+    def beliefs(self, state: Array) -> Array:
+        """What the robots of a batch are believed to be, (batch, numbers): here the nominal one."""
+        return np.tile(self._neutral, (len(state), 1))
 
     def estimate(self, signals: Signals, state: Array) -> None:
         """Bring the state, (batch, size), to the present, in place."""
         blocks = self._blocks(signals, state, past=True)
         advance_all(blocks, self._nominal.plant)
-        if self._navigator is None:
-            update(signals, self._nominal, self._correction, blocks, state)
+        if self._filter is None:
+            update(signals, self._nominal, self._linear.correction, blocks, state)
         else:
-            update_late(signals, self._nominal, self._navigator.constants, blocks, state)
+            transition = transition_of(self._linear, ESTIMATES)
+            update_late(signals, self._nominal, self._filter, transition, blocks, state)
 
     def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
         """Where estimated robots go if their last commands are held.
@@ -322,5 +349,5 @@ class Predictor:
     def _blocks(self, signals: Signals, state: Array, past: bool) -> Array:
         seen = signals.observation
         blocks = np.zeros((-(-len(seen) // WIDTH), self._nominal.row.size * WIDTH))
-        place_all(seen, self._nominal, state, past, blocks)
+        place_all(seen, self._nominal, state, past, self.beliefs(state), blocks)
         return blocks

@@ -84,10 +84,10 @@ def receding_gain(transition: Array, periods: int, weight: float) -> Array:
 
 
 @compiled
-def receding(signals, model, inertia, gain, ahead, force):
+def receding(signals, model, inertia, gain, beliefs, ahead, force):
     """Add the first change to the force of the held commands; fills in the force, (batch, axes)."""
     for b, axis in np.ndindex(force.shape):
-        total = held_force(signals, model, b, axis)
+        total = held_force(signals, model, beliefs[b], b, axis)
         for i in range(ahead.shape[0]):
             total -= inertia[axis] * gain[axis, i] * ahead[i, b, axis, 0]
         force[b, axis] = total
@@ -129,4 +129,5 @@ class MPC(ScriptedPolicy):
         """Estimate, foresee, correct."""
         self._predictor.estimate(signals, state)
         ahead = self._predictor.foresee(signals, state, self._periods)
-        receding(signals, self._model, self._inertia, self._gain, ahead, force)
+        beliefs = self._predictor.beliefs(state)
+        receding(signals, self._model, self._inertia, self._gain, beliefs, ahead, force)
