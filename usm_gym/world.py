@@ -20,8 +20,8 @@ from usm_gym.sensors import Layout
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.loss import LOST_ERROR, find_lost
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.sensing import Sensing
 from usm_gym.task.reward import reward, reward_of_loss
+from usm_gym.task.sensing import Sensing
 
 Array = NDArray[np.float64]
 

@@ -366,7 +366,7 @@ class Navigator:
         The variance is 0 where none has.
         """
         axes, (_, kept) = self.constants.axes, self._parts(memory)
-        pairs = kept[:, INNOVATION : INNOVATION + 2 * axes].reshape(-1, axes, 2)
+        pairs = kept[:, INNOVATION : INNOVATION + 2 * axes].reshape(-1, axes, 2).copy()
         return pairs[:, :, 0], pairs[:, :, 1]
 
     def covariance(self, memory: Array) -> Array:
