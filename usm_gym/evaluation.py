@@ -186,7 +186,7 @@ def metric_names(world: World) -> list[str]:
 def score(trajectory: Trajectory) -> dict[str, float | bool]:
     """The metrics of an episode; a lost one counts as at least 0.5 m in all axes."""
     scenario, time, error = trajectory.scenario, trajectory.time, trajectory.error
-    world, settle = world_of(scenario.body), scenario.settle_time
+    world, settle, shifts = world_of(scenario.body), scenario.settle_time, scenario.shifts
     names = metric_names(world)[: len(POSITION_METRICS) * len(world.axes)]
     row: dict[str, float | bool]
     if trajectory.lost:
@@ -195,7 +195,7 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
     else:
         values = [
             metrics.max_error(time, error, settle),
-            metrics.settled_error(time, error, scenario.shifts, settle, _recovery(scenario)),
+            metrics.settled_error(time, error, shifts, settle, metrics.recovery_from(shifts)),
             metrics.rms_error(time, error, settle),
         ]
         row = dict(zip(names, np.concatenate(values).tolist(), strict=True))
@@ -209,11 +209,6 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
         "saturation_share": metrics.saturation_share(trajectory.command, limit),
         FAILED: trajectory.lost,
     }
-
-
-def _recovery(scenario: Any) -> float:
-    scan = scenario.conditions.shift_gap_range is not None
-    return metrics.SCAN_RECOVERY if scan else metrics.RECOVERY
 
 
 class _Recording:
