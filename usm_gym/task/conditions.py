@@ -210,4 +210,9 @@ def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
     return build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
 
 
+def preset_of(conditions: Conditions | None) -> str:
+    """The name of the preset that some conditions are; empty if they are none."""
+    return next((name for name, preset in PRESETS.items() if preset == conditions), "")
+
+
 _ADAPTER = TypeAdapter(Conditions)
