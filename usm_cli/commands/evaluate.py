@@ -112,9 +112,12 @@ def run(arguments: argparse.Namespace) -> None:
 def table(result: EvaluationResult) -> Table:
     """The scores for the terminal, errors in mm."""
     axes, medians = result.axes, medians_in(result.results.values())
-    rms_axes = () if medians else rms_in(result.results.values())
-    headings = [*axes, *(f"median\n{axis}" for axis in medians)]
-    headings += [f"worst {axis}" for axis in axes] + [f"rms {axis}" for axis in rms_axes]
+    headings = [*axes]
+    if medians:  # leaves less room
+        headings += [f"{what}\n{' / '.join(axes)}" for what in ("median", "worst")]
+    else:
+        headings += [f"worst {axis}" for axis in axes]
+        headings += [f"rms {axis}" for axis in rms_in(result.results.values())]
     headings += [f"{angle}\n°" for angle in attitude_in(result.results.values())]
     where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
     rows = empty_table(
@@ -122,11 +125,15 @@ def table(result: EvaluationResult) -> Table:
         numbers=(*headings, "variation\nN/s", "objective\nmm", "lost"),
         title=f"largest position error after settling, mm: mean [95 % interval] ({where})",
     )
+    rows.columns[0].no_wrap = True
     for name, row in ordered(result):
         errors = row.errors.values()
         cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
-        cells += [mm(row.medians[axis]) for axis in medians]
-        cells += [mm(e.worst) for e in errors] + [mm(row.rms[axis].mean) for axis in rms_axes]
+        worst = [mm(e.worst) for e in errors]
+        if medians:
+            cells += [" / ".join(map(mm, row.medians.values())), " / ".join(worst)]
+        else:
+            cells += [*worst, *(mm(e.mean) for e in row.rms.values())]
         cells += [degrees(e.mean) for e in row.attitude.values()]
         cells += [figures(row.metrics["thrust_variation"].mean), figures(row.objective)]
         cells.append(lost(row, bool(medians)))

@@ -29,15 +29,16 @@ def draw(result: RobustnessResult) -> Any:
     losses = any(point.failures for points in curves.values() for point in points)
     columns = max(len(result.axes) + losses, 1)
     figure, (panels,) = plt.subplots(
-        1, columns, figsize=(5 * columns, 4.5), squeeze=False, layout="constrained"
+        1, columns, figsize=(5 * columns, 4.5), squeeze=False, sharex=True, layout="constrained"
     )
+    whose = " of the robots not lost" if losses else ""
     for panel in panels:
         panel.set_xlabel(result.label)
         panel.grid(alpha=0.3)
     for panel, axis in zip(panels, result.axes, strict=False):
         for number, (name, points) in enumerate(curves.items()):
             _draw_curve(panel, points, axis, color=f"C{number % 10}", label=name)
-        panel.set(yscale="log", ylabel=f"error in {axis} [mm]")
+        panel.set(yscale="log", ylabel=f"error in {axis}{whose} [mm]")
     if losses:
         for number, (name, points) in enumerate(curves.items()):
             shares = [100 * point.failures / point.episodes for point in points]
