@@ -69,4 +69,5 @@ def _draw_curve(
 def _kept(point: ScoredPoint, axis: str) -> NDArray[np.float64]:
     """The errors of the robots that are not lost, mm."""
     lost = np.array(point.per_episode.get(FAILED, (False,) * point.episodes), bool)
-    return 1e3 * np.array(point.per_episode[MAX_ERROR + axis], float)[~lost]
+    errors = np.array(point.per_episode[MAX_ERROR + axis], float)
+    return np.asarray(1e3 * errors[~lost])
