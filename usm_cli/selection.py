@@ -38,7 +38,7 @@ policies:
 
 
 def add_policies(
-    parser: argparse.ArgumentParser, default: str = "all competitors that are meant for these"
+    parser: argparse.ArgumentParser, default: str = "all competitors meant for the conditions"
 ) -> None:
     """Add the option that names policies."""
     parser.add_argument(
