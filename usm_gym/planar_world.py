@@ -43,7 +43,7 @@ def observe(fleet, plant, table, robot, lanes):
     """Measure one robot; not a `piece`, which would slow down what it is inlined in."""
     row, lane, instant = fleet.blocks[robot // lanes], robot % lanes, fleet.instant[robot]
     # A robot whose episode has ended may be stepped on until it is restarted.
-    now = min(instant, fleet.taken.shape[1] - 1)
+    now = min(instant, fleet.steps[robot])
     error, past = fleet.error[robot], fleet.past[robot]
     reference = find_error(row, lanes, lane, plant, error)
     kept = past[instant % past.shape[0]]
@@ -63,12 +63,9 @@ def observe(fleet, plant, table, robot, lanes):
     observation[k], observation[k + 1] = 0.0, 0.0
     if at >= 0:
         age = (now - at) * period
-        seen, noise_then = (
-            past[(instant - (now - at)) % past.shape[0]],
-            fleet.other_noise[robot, at],
-        )
+        seen, noises = past[(instant - (now - at)) % past.shape[0]], fleet.other_noise[robot, at]
         for axis in range(AXES):
-            velocity = seen[AXES + axis] + noise_then[axis]
+            velocity = seen[AXES + axis] + noises[axis]
             observation[k + axis] = velocity * table.gain[k + axis]
     measure_age(ENTRY.velocity_age, age, table, observation)
     for k in range(observation.size):
@@ -189,8 +186,8 @@ class PlanarWorld(World):
         """Refuse a scenario that the robot cannot swim.
 
         Raises:
-            ValueError: If more joints shall bend than it has, factors or gains do not match its links and
-                thrusters, or the episode is too much work.
+            ValueError: If more joints shall bend than it has, factors or gains do not match its
+                links and thrusters, or the episode is too much work.
         """
         joints = self.links - 1
         bending = scenario.inspection.bending_joints

@@ -226,6 +226,7 @@ class Simulation:
         self.fleet = Fleet(
             blocks=self._rows.reshape(len(self._rows), -1),
             instant=self.count,
+            steps=self.steps,
             taken=self._taken,
             noise=self._noise,
             other_noise=self._other_noise,
@@ -242,8 +243,8 @@ class Simulation:
 def _written(kept: NDArray[Any], index: int, values: NDArray[Any]) -> NDArray[Any]:
     """What is kept of all robots, (size, instants, numbers), with new values of one of them.
 
-    There is room for the most instants and numbers of any; the last instant's values stay for what
-    comes after.
+    There is room for the most instants and numbers of any. Nothing reads a robot's instants after
+    its last one; numbers that it lacks are 0.
     """
     instants, numbers = values.shape
     room = [max(instants - kept.shape[1], 0), max(numbers - kept.shape[2], 0)]

@@ -33,6 +33,7 @@ class Fleet(NamedTuple):
         blocks: Numbers of all robots, (blocks, rows * lanes); a row holds one number
             for every robot of the block.
         instant: Control periods since the start, int64, (size,).
+        steps: Control periods of the episode, after which nothing is drawn, int64, (size,).
         taken: At which control instant the position and the velocity that are known at an instant
             were measured, int32, (size, control instants, 2); -1 where nothing measures it.
         noise: Errors of positions that are measured at an instant, m, (size, control instants,
@@ -52,6 +53,7 @@ class Fleet(NamedTuple):
 
     blocks: Array
     instant: NDArray[np.int64]
+    steps: NDArray[np.int64]
     taken: NDArray[np.int32]
     noise: Array
     other_noise: NDArray[np.float32]

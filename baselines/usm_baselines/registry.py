@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from usm_baselines.gains import TUNED, GainsFile, read_gains
+from usm_baselines.gains import FOLDERS, GainsFile, read_gains
 from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
 from usm_baselines.laws.generalised_super_twisting import (
     AdaptiveGeneralisedSuperTwisting,
@@ -47,6 +47,7 @@ class Registration:
         on_request: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
         note: What to bear in mind about its scores; empty if nothing.
+        tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
     """
 
     factory: Callable[..., Policy]
@@ -56,6 +57,7 @@ class Registration:
     on_request: bool = False
     privileged: bool = False
     note: str = ""
+    tuned_for: str = ""
 
 
 _entries: dict[str, Registration] = {}
@@ -72,7 +74,7 @@ def register(
     privileged: bool = False,
     note: str = "",
 ) -> None:
-    """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
+    """Register a policy, and as `ID-tuned`, `ID-basin`, `ID-sea` the same with shipped gains.
 
     Args:
         id: Its name.
@@ -82,8 +84,8 @@ def register(
         space: The gains that are tuned, by name, and where; without it, as the `Gains` of a
             `ScriptedPolicy` declare, and none of another factory.
         told: What it is told besides the measured position and the reference.
-        on_request: Whether to leave it out of evaluations unless it is asked for; its tuned form
-            is not left out.
+        on_request: Whether to leave it out of evaluations unless it is asked for; its tuned forms
+            are not left out.
         privileged: Whether it is given true state.
         note: What to bear in mind about its scores.
 
@@ -93,9 +95,10 @@ def register(
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
     _entries[id] = Registration(factory, summary, chosen, told, on_request, privileged, note)
-    shipped = TUNED / f"{id}.json"
-    if shipped.is_file():
-        _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
+    for suffix, folder in FOLDERS.items():
+        shipped = TUNED / folder / f"{id}.json"
+        if shipped.is_file():
+            _entries[f"{id}-{suffix}"] = tuned(read_gains(shipped))
 
 
 def _declared_space(factory: Any) -> Space:
@@ -137,6 +140,7 @@ def tuned(file: GainsFile) -> Registration:
         told=base.told,
         privileged=base.privileged,
         note=base.note,
+        tuned_for=file.tuned_for,
     )
 
 

@@ -33,7 +33,7 @@ class Shared(NamedTuple):
 def observe(fleet, shared, table, k, lanes):
     row, lane, seen = fleet.blocks[k // lanes], k % lanes, fleet.observation[k]
     t, speed = row[CLOCK * lanes + lane] * shared.h, row[SPEED * lanes + lane]
-    noise = fleet.noise[k, min(fleet.instant[k], fleet.noise.shape[1] - 1)]
+    noise = fleet.noise[k, min(fleet.instant[k], fleet.steps[k])]
     for axis in range(3):
         share = speed / (1.0 + axis)
         fleet.error[k, axis] = row[(P + axis) * lanes + lane] - share * t

@@ -24,7 +24,8 @@ Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
 Delay = Annotated[int, Strict(), Field(ge=0, le=LARGEST_DELAY)]
 Every = Annotated[int, Strict(), Field(ge=1, le=LARGEST_PERIOD)]
 Noise = Annotated[Number, Field(ge=0, le=1)]
-Gap = Annotated[Number, Field(ge=1, le=1000)]
+# A scan has room for so many shifts up to its end, and metrics leave 3 s after each out.
+Gap = Annotated[Number, Field(ge=4, le=30)]
 FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
 
 
@@ -44,7 +45,7 @@ class Conditions:
         drag: "linear and quadratic", as published, or "quadratic" alone, ibidem. No control law is
             told.
         thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
-        thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
+        thruster_limit: Largest command of a thruster, 0.01 to 1000 N.
         thruster_dead_band: Commands below this make no force, 0 to 1000 N.
         thruster_gain_range: Force of a thruster over its command, drawn for each, 0.01 to 100.
         action_delay: After how many control periods a command takes effect, 0 to 100.
@@ -67,7 +68,7 @@ class Conditions:
             a share of them, 0 to 0.99.
         deflection_range: Size of the head deflections, 0.001 to 20 rad.
         filter_range: Natural frequency of the joint references' filter, 0.01 to 1000 rad/s.
-        shift_gap_range: Time between shifts of a scan, 1 to 1000 s; None: three shifts in 40 s. A
+        shift_gap_range: Time between shifts of a scan, 4 to 30 s; None: three shifts in 40 s. A
             scan lasts 60 s, of which the first 20 do not count, in either mode.
         motion: False keeps the joints still.
     """
@@ -207,6 +208,11 @@ def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
         require(value in PRESETS, "conditions", value, ", ".join(PRESETS))
         return PRESETS[value]
     return build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
+
+
+def preset_of(conditions: Conditions | None) -> str:
+    """The name of the preset that some conditions are; empty if they are none."""
+    return next((name for name, preset in PRESETS.items() if preset == conditions), "")
 
 
 _ADAPTER = TypeAdapter(Conditions)

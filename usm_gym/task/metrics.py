@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.support.validation import real_array, require
 
 # Controllers are given this long after a change of the joint references, s, and where one follows
-# the other, as in a scan.
-RECOVERY, SCAN_RECOVERY = 7.0, 3.0
+# another within `SCAN_GAP`, as in a scan.
+RECOVERY, SCAN_RECOVERY, SCAN_GAP = 7.0, 3.0, 6.0
 TIME_TOLERANCE = 1e-9
 # Begins the names of the metric of Table 1, one per axis, and ends those of attitude errors.
 MAX_ERROR, ANGLE_ERROR = "max_error_", "_error"
@@ -63,6 +63,12 @@ def settled_error(
         late &= (times < shift) | (times >= shift + recovery)
     require(late.any(), "shifts", shifts, f"some of the time up to {times[-1]} s left")
     return np.asarray(np.abs(errors[late]).max(axis=0))
+
+
+def recovery_from(shifts: Sequence[float]) -> float:
+    """How long after each change of the joint references a settled error does not count, s."""
+    scan = bool(np.any(np.diff(shifts) < SCAN_GAP))
+    return SCAN_RECOVERY if scan else RECOVERY
 
 
 def shift_errors(time: ArrayLike, error: ArrayLike, shifts: Sequence[float]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from usm_gym.support.validation import require
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal knowledge from which policies are made; no true coefficient, no current.
+    """The nominal knowledge from which policies are made: nothing that is drawn for an episode.
 
     Attributes:
         robot: The robot with its nominal coefficients; `usm_gym.world.world_of` gives its axes.

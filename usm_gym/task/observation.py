@@ -81,7 +81,7 @@ class ObservationLayout(Layout):
                 1.1,
                 "command in effect over the thruster limit, after saturation",
             ),
-            Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest force of a thruster"),
+            Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest command of a thruster"),
             Entry(
                 "position_age",
                 1,

@@ -99,7 +99,7 @@ class Scenario:
         duration: Length of the episode, 1e-6 to 3600 s; a multiple of the control period, and
             100 million physics steps at most.
         settle_time: From when on errors count, 0 to 3600 s.
-        noise_seed: Seed of the sensor noise, 0 to 2^64 - 1.
+        noise_seed: Seed of the sensors' errors and gaps, 0 to 2^64 - 1.
         joint_stiffness: Joint controllers' proportional gain, 0 to 1e6 N m/rad; None: the robot's.
         joint_damping: Joint controllers' derivative gain, 0 to 1e6 N m s/rad; None: the robot's.
         heading: Whether heading means the mean link angle or the head link's.
@@ -219,7 +219,7 @@ class Scenario:
         return positions
 
     def under(self, conditions: Conditions) -> Scenario:
-        """The same episode under other conditions, its water redrawn from the same noise seed."""
+        """The same episode under other conditions; water and gains are redrawn from its seed."""
         body = self.body
         water, gains = draw_water(conditions, self.noise_seed, body.links, len(body.thrusters))
         return dataclasses.replace(self, conditions=conditions, water=water, thruster_gains=gains)

@@ -58,9 +58,8 @@ def sensing(
     """
     instants = steps + 1
     taken = np.full((instants, 2), NONE, np.int32)
-    missing = _stream(noise_seed, MISSING).random((instants, 2))
-    lost = missing < conditions.position_missing
-    taken[:, 0] = known(conditions.position_period, conditions.position_delay, lost[:, 0])
+    missing = _stream(noise_seed, MISSING).random(instants) < conditions.position_missing
+    taken[:, 0] = known(conditions.position_period, conditions.position_delay, missing)
     if conditions.velocity_period is not None:
         none = np.zeros(instants, bool)
         taken[:, 1] = known(conditions.velocity_period, conditions.velocity_delay, none)
