@@ -24,7 +24,7 @@ from usm_gym.evaluation import BATCH, Evaluation
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.validation import explaining, require
-from usm_gym.task.conditions import Conditions
+from usm_gym.task.conditions import PRESETS, Conditions
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import MODES, Mode, Scenario
 
@@ -61,7 +61,7 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
     add(
         "--conditions",
         metavar="C",
-        help="ideal, field, rough, or a JSON object of fields that differ from field; "
+        help=f"{', '.join(PRESETS)}, or a JSON object of fields that differ from field; "
         "replaces the conditions of a suite (default: those of the suite, or field)",
     )
 

@@ -83,7 +83,7 @@ def test_a_registration_is_forgotten_after_its_test() -> None:
 
 def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
     usm_baselines.register("mine", Probe, "a probe")
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     env.reset(seed=0)
     policy: Any = usm_baselines.make("mine", env, k_p=3.0)
     (nominal,) = policy.args
@@ -105,7 +105,7 @@ def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
 
 def test_nominal_knowledge_tells_no_water_from_another() -> None:
     rng = np.random.default_rng(0)
-    rough = {sample("operation", PRESETS["rough"], rng).nominal for _ in range(5)}
+    rough = {sample("operation", PRESETS["basin"], rng).nominal for _ in range(5)}
     assert len(rough) == 1
     wild = replace(
         named("nominal", "operation"), water=Water(current=(0.1, 0.1), coefficients=(1.5,) * 6)
@@ -114,10 +114,10 @@ def test_nominal_knowledge_tells_no_water_from_another() -> None:
 
 
 def test_environments_may_be_wrapped_vectorised_or_left_out() -> None:
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     expected = env.unwrapped.nominal
     wrapped = gym.wrappers.TimeLimit(env, 10)
-    vector = DummyVecEnv([lambda: gym.make("USM-Operation-v0", conditions="rough")] * 2)
+    vector = DummyVecEnv([lambda: gym.make("USM-Operation-v0", conditions="basin")] * 2)
     for given in (env, env.unwrapped, wrapped, vector, expected):
         made: Any = usm_baselines.make("sta", given)
         assert made.nominal == expected

@@ -56,7 +56,7 @@ def test_an_episode_is_truncated_at_its_duration(id):
 
 
 def test_observations_stay_inside_their_bounds_and_vary():
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     observations = np.array([o for o, _, _ in rollout(env, 2000)])
     assert env.observation_space.shape == (90,)
     assert (np.abs(observations) < env.observation_space.high).sum() > 0
@@ -143,7 +143,7 @@ def test_gymnasiums_vector_environments_give_the_same_bits(vector):
 
 
 def test_snapshot_and_restore_repeat_the_same_bits():
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     actions = np.random.default_rng(1).uniform(-0.2, 0.2, (200, 5)).astype(np.float32)
     env.reset(seed=5)
     for action in actions[:100]:
@@ -233,7 +233,7 @@ def test_actions_beyond_the_bounds_saturate():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"conditions": "stormy"}, "conditions is 'stormy'; allowed: ideal, field, rough"),
+        ({"conditions": "stormy"}, "conditions is 'stormy'; allowed: ideal, field, basin, sea"),
         ({"conditions": {"noise": 1.0}}, "noise"),
         ({"conditions": {"position_noise": -1.0}}, "greater than or equal to 0"),
         ({"robot": {"links": 1}}, "links is 1"),
@@ -278,7 +278,7 @@ def test_options_survive_the_spec():
 
 def test_a_scenario_brings_its_own_conditions():
     scenario = usm_gym.suite("operation-ideal")[0]
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     for given in (scenario, scenario.to_dict(), json.loads(json.dumps(scenario.to_dict()))):
         env.reset(options={"scenario": given})
         assert env.unwrapped.scenario == scenario
@@ -286,7 +286,7 @@ def test_a_scenario_brings_its_own_conditions():
 
 
 def test_nominal_knowledge_holds_no_truth():
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     knowledge = []
     for seed in (0, 1):
         env.reset(seed=seed)

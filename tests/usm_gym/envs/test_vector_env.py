@@ -54,7 +54,7 @@ def test_every_autoreset_mode_is_gymnasiums_to_the_bit(mode):
 
 
 def test_a_whole_noisy_episode_with_feedback_is_the_single_environments():
-    envs = native(11, conditions="rough")
+    envs = native(11, conditions="basin")
     policy = usm_baselines.make("sta", envs)
     seeds = list(range(100, 111))
     observations, _ = envs.reset(seed=seeds)
@@ -64,7 +64,7 @@ def test_a_whole_noisy_episode_with_feedback_is_the_single_environments():
         observations, *_, infos = envs.step(actions)
         record.append(observations)
     for index in (0, 7, 8, 10):
-        env = gym.make(ID, conditions="rough")
+        env = gym.make(ID, conditions="basin")
         policy = usm_baselines.make("sta", env)
         observation, _ = env.reset(seed=seeds[index])
         state = None
