@@ -283,25 +283,6 @@ def test_still_joints_have_no_reference() -> None:
         assert not references_of(simulation).any()
 
 
-@pytest.mark.parametrize("time_constant", [0.0, 0.05, 0.1])
-def test_thrusters_lag_exactly_behind_the_saturated_command(time_constant: float) -> None:
-    conditions = replace(IDEAL, thruster_time_constant=time_constant, thruster_limit=20.0)
-    simulation = Simulation([Scenario(conditions=conditions)])
-    rng = np.random.default_rng(0)
-    force = np.zeros(5)
-    kept = np.exp(-0.02 / time_constant) if time_constant else 0.0
-    saturated = False
-    for _ in range(50):
-        action = rng.normal(0.0, 1.0, 5).astype(np.float32)
-        saturated |= bool((np.abs(action) > 1.0).any())
-        simulation.step(action[np.newaxis])
-        command = 20.0 * np.clip(action.astype(float), -1.0, 1.0)
-        force = command + kept * (force - command)
-        np.testing.assert_array_equal(simulation.read("command")[0], command)
-        np.testing.assert_allclose(dense_step.read(simulation).thrust, force, rtol=0, atol=1e-12)
-    assert saturated
-
-
 STEPS = 300
 
 
