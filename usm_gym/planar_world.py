@@ -55,9 +55,7 @@ def observe(fleet, plant, table, robot, lanes):
     measured = seen[0] + noise[0], seen[1] + noise[1]
     others, angles = fleet.other_noise[robot, now], fleet.attitude_error[robot]
     observation = fleet.observation[robot]
-    measure(
-        row, lanes, lane, plant, reference, measured, others[AXES:], table, angles, observation
-    )
+    measure(row, lanes, lane, plant, reference, measured, others[AXES:], table, angles, observation)
     period = plant.substeps * plant.h
     measure_age(ENTRY.position_age, (now - at) * period, table, observation)
     at = fleet.taken[robot, now, 1]

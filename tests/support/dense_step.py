@@ -216,8 +216,8 @@ def accelerations(
 ) -> tuple[Array, Array]:
     """Return q_ddot, (n + 2,), and the accelerations of the link centres, (n, 2).
 
-    Every link has coefficients of its own, (6, n). The drag is that of the moment plus its slope times lead times what the accelerations have
-    changed by since the step before.
+    Every link has coefficients of its own, (6, n). The drag is that of the moment plus its slope
+    times lead times what the accelerations have changed by since the step before.
     """
     c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
     body = oracle.links(robot, moment.theta)

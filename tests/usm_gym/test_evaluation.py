@@ -39,7 +39,7 @@ def short(mode: Any, preset: str, seed: int, duration: float = 6.0) -> Scenario:
 @cache
 def mixed() -> tuple[Scenario, ...]:
     """Return scenarios of several modes, lengths and timings, not in any order."""
-    operation = [short("operation", "rough", k, 6.0 + k % 3) for k in range(4)]
+    operation = [short("operation", "basin", k, 6.0 + k % 3) for k in range(4)]
     fast = replace(PRESETS["field"], physics_step=2e-3)
     fine = replace(PRESETS["field"], physics_step=5e-4, hydrodynamics="kelasidi2014")
     return (

@@ -86,7 +86,7 @@ class USMEnv(TrackingEnv):
 
     | argument | default | meaning |
     |---|---|---|
-    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"basin"`, `"sea"`, or a dict of `Conditions` fields |
+    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"basin"`, `"sea"`, or a dict of fields |
     | `robot` | the paper's | a dict of `Robot` fields |
     | `render_mode` | None | `"rgb_array"`: `render()` gives an image of 640 x 480; `"human"`: a \
 window shows every step in real time (drawing needs the extra `render`) |

@@ -70,7 +70,7 @@ def test_what_is_observed_was_true_when_it_was_measured(
         for robot, each in enumerate(measured):
             seen = seen_by(simulation, robot)
             at, velocity_at = each.taken[k].tolist()
-            expected = errors[at][robot] + each.position[at]
+            expected = np.clip(errors[at][robot] + each.position[at], -0.5, 0.5)  # its bound
             np.testing.assert_allclose(seen["position_error"], expected, rtol=1e-6, atol=1e-9)
             assert seen["position_age"] == pytest.approx((k - at) * 0.02, rel=1e-6)
             ages.add(k - at)
