@@ -96,17 +96,25 @@ def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
         "position_noise",
         "position_delay",
         "action_delay",
+        "position_period",
+        "velocity_period",
+        "velocity_delay",
+        "velocity_noise",
+        "tail_angle_noise",
+        "joint_angle_noise",
+        "rate_noise",
+        "thruster_dead_band",
     }
     assert nominal.robot == env.unwrapped.robot
     assert nominal.control_period == 0.02
-    assert nominal.thruster_time_constant == 0.1
-    assert nominal.position_noise == 2e-4
+    assert nominal.thruster_time_constant == 0.15
+    assert nominal.position_noise == 1e-3
 
 
 def test_nominal_knowledge_tells_no_water_from_another() -> None:
     rng = np.random.default_rng(0)
-    rough = {sample("operation", PRESETS["basin"], rng).nominal for _ in range(5)}
-    assert len(rough) == 1
+    basin = {sample("operation", PRESETS["basin"], rng).nominal for _ in range(5)}
+    assert len(basin) == 1
     wild = replace(
         named("nominal", "operation"), water=Water(current=(0.1, 0.1), coefficients=(1.5,) * 6)
     )
