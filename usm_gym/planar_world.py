@@ -228,8 +228,8 @@ class PlanarWorld(World):
         slow = (water.amplitude, water.phase, water.period)
         waves = ((wave.amplitude, (wave.phase, wave.phase), wave.period) for wave in water.waves)
         for k, (amplitude, phase, period) in enumerate((slow, *waves)):
-            at = rows.SINUSOID + k * rows.SINUSOID_ROWS
-            row[at : at + rows.SINUSOID_ROWS] = *amplitude, *phase, 2 * np.pi / period
+            first = rows.SINUSOID + k * rows.SINUSOID_ROWS
+            row[first : first + rows.SINUSOID_ROWS] = *amplitude, *phase, 2 * np.pi / period
         share = rows.row_of(rows.SHARE, links) + links - 1 - motion.bending_joints
         row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
         shifts = len(scenario.shifts)

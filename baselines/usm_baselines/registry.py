@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from usm_baselines.gains import FOLDERS, GainsFile, read_gains
+from usm_baselines.gains import FOLDERS, TUNED, GainsFile, read_gains
 from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
 from usm_baselines.laws.generalised_super_twisting import (
     AdaptiveGeneralisedSuperTwisting,

@@ -38,7 +38,7 @@ def observations(steps: int, robots: int, seed: int = 0) -> NDArray[np.float32]:
     rng = np.random.default_rng(seed)
     seen = np.empty((steps, robots, LAYOUT.size), np.float32)
     for robot in range(robots):
-        env = gym.make("USM-Operation-v0", conditions="rough")
+        env = gym.make("USM-Operation-v0", conditions="basin")
         seen[0, robot], _ = env.reset(seed=seed + robot)
         for k in range(1, steps):
             action = rng.uniform(-1.0, 1.0, 5).astype(np.float32)

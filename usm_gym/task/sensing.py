@@ -69,10 +69,9 @@ def sensing(
     if measured:
         velocity = _stream(noise_seed, VELOCITY).standard_normal((instants, axes), np.float32)
         others[:, :axes] = np.float32(conditions.velocity_noise) * velocity
-        angles = _stream(noise_seed, ANGLES).standard_normal(
-            (instants, len(angle_noise)), np.float32
-        )
-        others[:, axes:] = np.float32(angle_noise) * angles
+        sizes = np.array(angle_noise, np.float32)
+        angles = _stream(noise_seed, ANGLES).standard_normal((instants, sizes.size), np.float32)
+        others[:, axes:] = sizes * angles
     return Sensing(taken, conditions.position_noise * position, others)
 
 

@@ -10,9 +10,9 @@ import usm_baselines
 from usm_cli.selection import chosen_contenders
 from usm_gym import Robot, evaluate
 from usm_gym.evaluation import rollout, score
-from usm_gym.suites import suite
-from usm_gym.support.seeding import TUNING, stream
-from usm_gym.task.conditions import PRESETS
+from usm_gym.suites.__main__ import SEED
+from usm_gym.support.seeding import SUITE, TUNING, stream
+from usm_gym.task.conditions import PRESETS, Conditions
 from usm_gym.task.sampling import sample
 
 ROBOT = Robot()
@@ -33,7 +33,17 @@ def test_leaves_hundredths_of_a_millimetre(conditions: str) -> None:
 
 def test_knows_the_limits_of_the_thrusters() -> None:
     # With clipped commands it would swing ever wider after the second change of the joints.
-    episode = dataclasses.replace(suite("operation-rough")[34], duration=24.0)
+    hard = Conditions(
+        thruster_time_constant=0.1,
+        thruster_limit=15.0,
+        current_limit=0.1,
+        current_variation=0.05,
+        coefficient_range=(0.6, 1.5),
+        deflection_range=(0.9, 2.1),
+        filter_range=(8.0, 14.0),
+    )
+    drawn = sample("operation", hard, stream(SEED, SUITE, 2, 34))
+    episode = dataclasses.replace(drawn, duration=24.0)
     (mine,), (others,) = (
         rollout(usm_baselines.make(id, episode.nominal), [episode]) for id in ("oracle", "mpc")
     )

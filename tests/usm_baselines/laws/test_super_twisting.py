@@ -203,7 +203,7 @@ def test_alpha_falls_inside_the_dead_zone_as_fast_as_it_grows_in_the_law_of_shte
         },
     ],
 )
-@pytest.mark.parametrize("conditions", ["field", "rough"])
+@pytest.mark.parametrize("conditions", ["field", "basin"])
 def test_the_policy_is_that_of_plain_python(conditions: str, gains: dict[str, float]) -> None:
     env = gym.make("USM-Operation-v0", conditions=conditions)
     robot = Robot()

@@ -33,7 +33,7 @@ from usm_gym.task.sampling import sample
 from usm_gym.simulation import Simulation
 draw = np.random.default_rng(0)
 for size in (1, 3):
-    scenarios = [sample("operation", PRESETS["rough"], draw) for _ in range(size)]
+    scenarios = [sample("operation", PRESETS["sea"], draw) for _ in range(size)]
     fleet = Simulation(scenarios)
     for _ in range(100):
         fleet.step(draw.uniform(-1, 1, (size, 5)).astype(np.float32))
