@@ -204,7 +204,7 @@ def shared_size(model: Model) -> int:
 def signals_of(
     observation: NDArray[np.float32], model: Model, world: World, navigated: bool = False
 ) -> Signals:
-    """Signals of a batch, of which `sense` fills in all but the allocation and what a navigator estimates."""
+    """Signals of a batch; the allocation is in, `sense` and a navigator fill in the rest."""
     size = len(observation)
     y, u, velocity, acceleration, rate, disturbance, thrust = np.empty((7, size, model.axes))
     allocation = np.empty((size, model.axes + model.angles, model.thrusters))

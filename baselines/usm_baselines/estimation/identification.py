@@ -2,9 +2,9 @@
 
 Beside (e, v, d) of each axis the filter of `navigator` estimates what is constant, or nearly so, in
 an episode: the hydrodynamic coefficients over their nominal values, the current, and the force of
-each thruster over its command. How they change the motion of the centre of mass in a period is found
-by differences of the nominal plant, whose copies are further lanes of the blocks that are advanced
-anyway. All of them drift a little, which is what forgets.
+each thruster over its command. How they change the motion of the centre of mass in a period is
+found by differences of the nominal plant, whose copies are further lanes of the blocks that are
+advanced anyway. All of them drift a little, which is what forgets.
 
 Source: L. Ljung, Asymptotic behavior of the extended Kalman filter as a parameter estimator for
 linear systems, IEEE Transactions on Automatic Control 24, 1979.

@@ -40,10 +40,10 @@ STATES, UNKNOWN_FOR = 3, 10.0
 # Memory of a robot: control periods since the start; for each axis the innovation, m, of the fix
 # that has arrived, and its variance, m^2, 0 if none has; then slots.
 COUNT, INNOVATION = 0, 1
-# A slot holds, of one instant, a header for each axis: the measured error and rate, with a mark each
-# whether there is one, and the velocity of the reference. Then of the whole: what was predicted,
-# its covariance, what became of it by the measurements of that instant, its covariance, and how it
-# follows from the instant before.
+# A slot holds, of one instant, a header for each axis: the measured error and rate, with a mark
+# each whether there is one, and the velocity of the reference. Then of the whole: what was
+# predicted, its covariance, what became of it by the measurements of that instant, its covariance,
+# and how it follows from the instant before.
 Y, HAS_Y, V, HAS_V, REFERENCE = range(5)
 MEASURED = 5
 

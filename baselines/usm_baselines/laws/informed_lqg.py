@@ -1,7 +1,7 @@
 """The law of `joint_lqg`, told what is constant in an episode: what identification could bring.
 
-It measures what all measure. Beyond that it is told the true hydrodynamic coefficients, the gains of
-the thrusters and the mean current; not the part of the current that varies, and no waves.
+It measures what all measure. Beyond that it is told the true hydrodynamic coefficients, the gains
+of the thrusters and the mean current; not the part of the current that varies, and no waves.
 """
 
 from __future__ import annotations
