@@ -126,10 +126,10 @@ class Identifier(Predictor):
         more = list(zip(np.repeat(spread, numbers), np.repeat(drift, numbers), strict=True))
         self._parameters = len(more)
         densities = acceleration_noise, disturbance_noise
-        self._filter = navigation(nominal, *densities, more)
+        self._identifying = navigation(nominal, *densities, more)
         self._known = ESTIMATES + self._thrusters + self._nominal.scale.size
         self._memory = self._known + self._parameters
-        self.size = self._memory + memory_size(self._filter)
+        self.size = self._memory + memory_size(self._identifying)
 
     def beliefs(self, state: Array) -> Array:
         """What the robots of a batch are believed to be, (batch, numbers)."""
@@ -141,7 +141,7 @@ class Identifier(Predictor):
 
     def uncertainty(self, state: Array) -> Array:
         """Standard deviations of the parameters, as beliefs have them, (batch, parameters)."""
-        P = covariance(self._filter, state[:, self._memory :])
+        P = covariance(self._identifying, state[:, self._memory :])
         return np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, ESTIMATES:])
 
     def estimate(self, signals: Signals, state: Array) -> None:
@@ -151,5 +151,6 @@ class Identifier(Predictor):
         blocks = np.zeros((each * len(seen), nominal.row.size * WIDTH))
         place_variations(seen, nominal, state, self.beliefs(state), parameters, blocks)
         advance_all(blocks, nominal.plant)
-        linear = transition_of(self._linear, self._filter.size)
-        identify(signals, nominal, self._filter, linear, parameters, blocks, state)
+        nav = self._identifying
+        linear = transition_of(self._linear, nav.size)
+        identify(signals, nominal, nav, linear, parameters, blocks, state)

@@ -117,8 +117,8 @@ def slot_size(axes: int, size: int) -> int:
     return MEASURED * axes + 2 * (size + size * size) + STATES * axes * size
 
 
-@piece
-def slot(nav, instant):
+@shared
+def slot(nav: Navigation, instant: int) -> Slot:
     """Where the slot of an instant is in the memory."""
     at = 1 + 2 * nav.axes + (instant % nav.slots) * slot_size(nav.axes, nav.size)
     prior = at + MEASURED * nav.axes
@@ -382,7 +382,7 @@ def covariance(nav: Navigation, memory: Array) -> Array:
     """Covariance of what is estimated of a batch, (batch, size, size)."""
     rows = []
     for own in memory:
-        first = slot.py_func(nav, int(own[COUNT])).post_covariance
+        first = slot(nav, int(own[COUNT])).post_covariance
         rows.append(own[first : first + nav.size**2].reshape(nav.size, nav.size))
     return np.stack(rows)
 

@@ -58,7 +58,8 @@ class InformedLQG(JointLQG):
         self._scenarios: tuple[Any, ...] = ()
 
     def _make_predictor(self, nominal: Nominal) -> Told:
-        return Told(nominal, *self.densities)
+        self._told = Told(nominal, *self.densities)
+        return self._told
 
     def predict(
         self,
@@ -86,8 +87,8 @@ class InformedLQG(JointLQG):
         assert snapshot is not None
         if snapshot.scenarios != self._scenarios:
             self._scenarios = snapshot.scenarios
-            self._predictor.tell(snapshot.scenarios)
+            self._told.tell(snapshot.scenarios)
         return super().predict(observation, state, episode_start, deterministic)
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
-        return compensated(super()._act(observation, state), self._predictor.truth)
+        return compensated(super()._act(observation, state), self._told.truth)

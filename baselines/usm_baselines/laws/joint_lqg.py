@@ -86,7 +86,7 @@ def joint_lqg(signals, model, linear, gain, state, beliefs, ahead, force):
 class JointLQG(LQG):
     """LQG control that foresees the joint motion; it keeps the state of a `Predictor`."""
 
-    Gains = JointLQGGains
+    Gains: type[Any] = JointLQGGains
     state = prediction.NAMES
     linear = False
 
