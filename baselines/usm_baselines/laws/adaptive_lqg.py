@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_baselines.estimation.identification import Identifier
-from usm_baselines.estimation.prediction import THRUSTER_GAINS
+from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS
 from usm_baselines.laws.joint_lqg import JointLQG, JointLQGGains
 from usm_baselines.policy import HEADING_GAIN
 from usm_baselines.signals import Array
@@ -52,11 +52,31 @@ class AdaptiveLQG(JointLQG):
     def _make_predictor(self, nominal: Nominal) -> Identifier:
         own = self.gains
         spread = np.array([own.coefficient_spread, own.current_spread, own.gain_spread])
-        return Identifier(nominal, *self.densities, spread, own.forgetting * spread)
+        self._identifier = Identifier(nominal, *self.densities, spread, own.forgetting * spread)
+        return self._identifier
+
+    def state_of(self, state: Array) -> dict[str, Array]:
+        """The law's own numbers in what `predict` returns, by name.
+
+        Returns:
+            Those of `JointLQG`, (batch, axes); what has been identified, `coefficients` over their
+            nominal values, (batch, 6), `current`, m/s, (batch, 2), and `thruster_gains`, force over
+            command, (batch, thrusters); and the standard deviation of each, `NAME_std`.
+        """
+        own = state[:, self._own :]
+        beliefs, uncertainty = self._identifier.beliefs(own), self._identifier.uncertainty(own)
+        named = super().state_of(state)
+        for name, part in {
+            "coefficients": slice(0, CURRENT),
+            "current": slice(CURRENT, THRUSTER_GAINS),
+            "thruster_gains": slice(THRUSTER_GAINS, uncertainty.shape[1]),
+        }.items():
+            named |= {name: beliefs[:, part], f"{name}_std": uncertainty[:, part]}
+        return named
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         action = super()._act(observation, state)
-        return compensated(action, self._predictor.beliefs(state[:, self._own :]))
+        return compensated(action, self._identifier.beliefs(state[:, self._own :]))
 
 
 def compensated(action: NDArray[np.float32], beliefs: Array) -> NDArray[np.float32]:
