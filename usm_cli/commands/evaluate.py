@@ -13,6 +13,7 @@ from usm_baselines.benchmark.results import (
     attitude_in,
     lost,
     medians_in,
+    over_informed,
     rms_in,
     shifts_in,
 )
@@ -119,6 +120,8 @@ def table(result: EvaluationResult) -> Table:
         headings += [f"worst {axis}" for axis in axes]
         headings += [f"rms {axis}" for axis in rms_in(result.results.values())]
     headings += [f"{angle}\n°" for angle in attitude_in(result.results.values())]
+    ratios = over_informed(result.results)
+    headings += ["over\ninformed"] if ratios else []
     where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
     rows = empty_table(
         "policy",
@@ -135,6 +138,7 @@ def table(result: EvaluationResult) -> Table:
         else:
             cells += [*worst, *(mm(e.mean) for e in row.rms.values())]
         cells += [degrees(e.mean) for e in row.attitude.values()]
+        cells += [ratios[name]] if ratios else []
         cells += [figures(row.metrics["thrust_variation"].mean), figures(row.objective)]
         cells.append(lost(row, bool(medians)))
         rows.add_row(f"{name} {MARK}" if row.note else name, *cells)

@@ -22,6 +22,7 @@ from usm_baselines.benchmark.results import (
     axes_in,
     lost,
     medians_in,
+    over_informed,
     rms_in,
     shifts_in,
 )
@@ -43,7 +44,8 @@ the objective by which gains and agents are chosen: the means in {axes} added up
 per degree of heading error and {variation} mm per N/s of thrust variation. The rank of a row is the
 place of the first row from which the data do not tell it. "Beats the next" says whether the
 interval of the paired difference to the next row leaves out 0, and with what probability an episode
-goes better.
+goes better. "Over informed" is a row's means over those of the law that is told what is constant in
+an episode: the distance that knowledge could close.
 """
 MEDIAN_LEGEND = """\
 Where robots are lost, and in scans, a table also has the median of the largest error, mm, and the
@@ -66,6 +68,8 @@ def table(rows: Mapping[str, Standing]) -> str:
     columns += [f"{what} {axis}" for what in ("middle half", "worst") for axis in axes]
     columns += [f"rms {axis}" for axis in rms_in(rows.values())]
     columns += [f"{angle}, °" for angle in angles]
+    ratios = over_informed(rows)
+    columns += ["over informed"] if ratios else []
     lines = _head([*columns, "objective", "thrust, N", "variation, N/s", "lost", "beats the next"])
     places = rank_labels(rows)
     for id, row in rows.items():
@@ -75,6 +79,7 @@ def table(rows: Mapping[str, Standing]) -> str:
         cells += [mm(error.iqm) for error in row.middle] + [mm(error.worst) for error in errors]
         cells += [mm(error.mean) for error in row.rms.values()]
         cells += [degrees(error.mean) for error in row.attitude.values()]
+        cells += [ratios[id]] if ratios else []
         cells.append(figures(row.objective))
         cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
         lead = row.beats_next

@@ -12,6 +12,7 @@ from usm_baselines.contender import Contender
 from usm_gym.evaluation import SHIFT_METRICS
 from usm_gym.statistics import Comparison
 from usm_gym.support.results import Interval, Part, Provenance, Result
+from usm_gym.support.text import figures
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
@@ -194,6 +195,27 @@ def shifts_in(rows: Iterable[Scores]) -> tuple[str, ...]:
     """The shifts after which all rows have errors; none if there is no row."""
     listed = [tuple(row.by_shift) for row in rows]
     return listed[0] if len(set(listed)) == 1 else ()
+
+
+# Its law is told what is constant in an episode.
+INFORMED = "informed"
+
+
+def over_informed(rows: Mapping[str, Scores]) -> dict[str, str]:
+    """Mean errors of each row over those of the law that is told what is constant, by name.
+
+    That is how far knowledge could take it. Empty if no such law is among the rows.
+    """
+    told = [row for id, row in rows.items() if id.partition("-")[0] == INFORMED]
+    if not told:
+        return {}
+    best = min(told, key=lambda row: row.objective)
+
+    def ratio(row: Scores) -> str:
+        pairs = zip(row.errors.values(), best.errors.values(), strict=True)
+        return " / ".join(figures(own.mean / limit.mean) for own, limit in pairs)
+
+    return {id: ratio(row) for id, row in rows.items()}
 
 
 def lost(row: Scores, shared: bool) -> str:
