@@ -13,6 +13,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 from support import oracle
 from support.ball import BallScenario
+from support.episodes import HARDER
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
@@ -34,11 +35,11 @@ def made(id: str) -> Any:
 
 
 def observations(steps: int, robots: int, seed: int = 0) -> NDArray[np.float32]:
-    """Return live observations of some robots that wobble about, (steps, robots, 90)."""
+    """Return live observations of some robots that wobble about, (steps, robots, 94)."""
     rng = np.random.default_rng(seed)
     seen = np.empty((steps, robots, LAYOUT.size), np.float32)
     for robot in range(robots):
-        env = gym.make("USM-Operation-v0", conditions="basin")
+        env = gym.make("USM-Operation-v0", conditions=HARDER)
         seen[0, robot], _ = env.reset(seed=seed + robot)
         for k in range(1, steps):
             action = rng.uniform(-1.0, 1.0, 5).astype(np.float32)
@@ -113,7 +114,7 @@ def test_an_episode_start_forgets_its_rows_only(id: str) -> None:
 
 
 @pytest.mark.parametrize("id", SCRIPTED[:-1])
-@pytest.mark.parametrize("shape", [(89,), (91,), (0,), (2, 89), (1, 1, 90), ()])
+@pytest.mark.parametrize("shape", [(93,), (95,), (0,), (2, 93), (1, 1, 94), ()])
 def test_observations_of_a_wrong_shape_are_refused(id: str, shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="observation"):
         made(id).predict(np.zeros(shape, np.float32))
@@ -200,7 +201,7 @@ def test_laws_do_not_know_how_many_axes_there_are(id: str) -> None:
     policy = made(id)
     rng = np.random.default_rng(0)
     (y, u, velocity, acceleration), started = rng.normal(0.0, 0.1, (4, 2, 3)), np.zeros(2)
-    rest = {"allocation": np.zeros((2, 4, 3)), "observation": np.zeros((2, 90), np.float32)}
+    rest = {"allocation": np.zeros((2, 4, 3)), "observation": np.zeros((2, 94), np.float32)}
     whole, parts = np.zeros((2, 3, len(policy.state))), np.zeros((3, 2, 1, len(policy.state)))
     force, part = np.empty((2, 3)), np.empty((2, 1))
     for _ in range(3):

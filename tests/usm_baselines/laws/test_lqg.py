@@ -58,7 +58,7 @@ def test_a_constant_disturbance_is_found_and_held_off() -> None:
             velocity=velocity,
             acceleration=acceleration,
             allocation=np.zeros((1, 3, 5)),
-            observation=np.zeros((1, 90), np.float32),
+            observation=np.zeros((1, 94), np.float32),
         )
         policy.control(signals, law, force)
         u = force[0] / linear.inertia
