@@ -13,6 +13,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 from support import oracle
 from support.ball import BallScenario
+from support.episodes import HARDER
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
@@ -36,12 +37,8 @@ def made(id: str) -> Any:
     return usm_baselines.make(id, gym.make("USM-Operation-v0"))
 
 
-# Positions come at once, thrusters are weak, the water moves.
-WOBBLY = {"current_limit": 0.1, "current_variation": 0.05, "thruster_limit": 15.0}
-
-
 def observations(
-    steps: int, robots: int, seed: int = 0, conditions: Any = WOBBLY
+    steps: int, robots: int, seed: int = 0, conditions: Any = HARDER
 ) -> NDArray[np.float32]:
     """Return live observations of some robots that wobble about, (steps, robots, 94)."""
     rng = np.random.default_rng(seed)
@@ -135,7 +132,7 @@ def test_an_episode_start_forgets_its_rows_only(id: str) -> None:
 
 
 @pytest.mark.parametrize("id", SCRIPTED[:-1])
-@pytest.mark.parametrize("shape", [(93,), (95,), (0,), (2, 89), (1, 1, 94), ()])
+@pytest.mark.parametrize("shape", [(93,), (95,), (0,), (2, 93), (1, 1, 94), ()])
 def test_observations_of_a_wrong_shape_are_refused(id: str, shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="observation"):
         made(id).predict(np.zeros(shape, np.float32))

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 import usm_baselines
+from support.episodes import HARDER
 
 from usm_cli.selection import chosen_contenders
 from usm_gym import Robot, evaluate
 from usm_gym.evaluation import rollout, score
 from usm_gym.suites.__main__ import SEED
 from usm_gym.support.seeding import SUITE, TUNING, stream
-from usm_gym.task.conditions import PRESETS, Conditions
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import sample
 
 ROBOT = Robot()
@@ -33,16 +34,7 @@ def test_leaves_hundredths_of_a_millimetre(conditions: str) -> None:
 
 def test_knows_the_limits_of_the_thrusters() -> None:
     # With clipped commands it would swing ever wider after the second change of the joints.
-    hard = Conditions(
-        thruster_time_constant=0.1,
-        thruster_limit=15.0,
-        current_limit=0.1,
-        current_variation=0.05,
-        coefficient_range=(0.6, 1.5),
-        deflection_range=(0.9, 2.1),
-        filter_range=(8.0, 14.0),
-    )
-    drawn = sample("operation", hard, stream(SEED, SUITE, 2, 34))
+    drawn = sample("operation", HARDER, stream(SEED, SUITE, 2, 34))
     episode = dataclasses.replace(drawn, duration=24.0)
     (mine,), (others,) = (
         rollout(usm_baselines.make(id, episode.nominal), [episode]) for id in ("oracle", "mpc")
@@ -77,4 +69,4 @@ def test_is_no_competitor_and_wants_the_truth() -> None:
     policy: Any = usm_baselines.make("oracle", episodes[0].nominal)
     assert policy.privileged
     with pytest.raises(ValueError, match="snapshot is None; allowed: the true state"):
-        policy.predict(np.zeros((1, 90), np.float32))
+        policy.predict(np.zeros((1, 94), np.float32))
