@@ -19,7 +19,7 @@ def stable_baselines3(line):
     env = model.get_env()
     assert env.render_mode == "rgb_array"
     action, _ = model.predict(env.reset())
-    assert env.step(action)[0].shape == (1, 90)
+    assert env.step(action)[0].shape == (1, 94)
 
 
 def rl_zoo(line):
@@ -44,8 +44,8 @@ def rllib(line):
 
 def tianshou(line):
     envs = evaluated(line, "import gymnasium as gym; from tianshou.env import SubprocVectorEnv")
-    assert envs.reset()[0].shape == (4, 90)
-    assert envs.step(np.zeros((4, 5), np.float32))[0].shape == (4, 90)
+    assert envs.reset()[0].shape == (4, 94)
+    assert envs.step(np.zeros((4, 5), np.float32))[0].shape == (4, 94)
     envs.close()
 
 
@@ -55,8 +55,8 @@ def skrl(line):
     )
     import torch
 
-    assert envs.reset()[0].shape == (64, 90)
-    assert envs.step(torch.zeros(64, 5))[0].shape == (64, 90)
+    assert envs.reset()[0].shape == (64, 94)
+    assert envs.step(torch.zeros(64, 5))[0].shape == (64, 94)
 
 
 def cleanrl(line):
@@ -94,7 +94,7 @@ def time_aware(line):
     )
     env.reset(seed=0)
     first = env.step(np.zeros(5, np.float32))[0]
-    assert first.shape == (91,)
+    assert first.shape == (95,)
     assert first[-1] == 1.0
 
 

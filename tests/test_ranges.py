@@ -10,10 +10,10 @@ from usm_agents.artifact.folder import Agent
 from usm_agents.learning.plan import Plan
 from usm_baselines.gains import Budget, GainsFile
 
-from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
+from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water, Wave
 
 CLASSES = [
-    *(Robot, Thruster, Conditions, Path, Inspection, Water, Scenario),
+    *(Robot, Thruster, Conditions, Path, Inspection, Water, Wave, Scenario),
     *(Plan, Agent, GainsFile, Budget),
 ]
 NUMBER = r"(?<![\w.^])-?\d+(?:\.\d+)?(?:e-?\d+)?"

@@ -16,7 +16,8 @@ from usm_baselines.benchmark.scoring import (
     score_all,
 )
 from usm_baselines.contender import Contender
-from usm_baselines.registry import entry, ids
+from usm_baselines.registry import entry
+from usm_baselines.tiers import TIERS, meant_for
 
 from usm_cli.options import add_computing, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
@@ -24,7 +25,7 @@ from usm_gym.evaluation import BATCH, Evaluation
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.validation import explaining, require
-from usm_gym.task.conditions import Conditions
+from usm_gym.task.conditions import PRESETS, Conditions
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import MODES, Mode, Scenario
 
@@ -36,7 +37,9 @@ policies:
 """
 
 
-def add_policies(parser: argparse.ArgumentParser, default: str = "all competitors") -> None:
+def add_policies(
+    parser: argparse.ArgumentParser, default: str = "all competitors meant for the conditions"
+) -> None:
     """Add the option that names policies."""
     parser.add_argument(
         "--policies", metavar="A,B", help=f"names, separated by commas (default: {default})"
@@ -49,7 +52,8 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
     add(
         "--suite",
         metavar="NAME",
-        help=f"frozen suite ({', '.join(NAMES)}; default: operation) or a file of scenarios",
+        help=f"frozen suite ({', '.join(NAMES)}; default: operation, or that of the conditions) or "
+        "a file of scenarios",
     )
     add("--seed", type=int, metavar="S", help="sample scenarios with this seed instead")
     if single:
@@ -61,8 +65,8 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
     add(
         "--conditions",
         metavar="C",
-        help="ideal, field, rough, or a JSON object of fields that differ from field; "
-        "replaces the conditions of a suite (default: those of the suite, or field)",
+        help=f"{', '.join(PRESETS)}, or a JSON object of fields that differ from field; replaces "
+        "the conditions of a suite (default: those of the suite, or field)",
     )
 
 
@@ -79,12 +83,17 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_contenders(names: str | None) -> list[Contender]:
-    """Get the policies that `--policies` names."""
-    if names is None:
-        chosen = [id for id in ids() if not (entry(id).on_request or entry(id).privileged)]
-    else:
-        chosen = [name.strip() for name in names.split(",") if name.strip()]
+def chosen_contenders(names: str | None, conditions: Conditions) -> list[Contender]:
+    """Get the policies that `--policies` names, or those that are meant for conditions."""
+    if names is not None:
+        return named_contenders(names)
+    policies = {id: entry(id) for id in meant_for(conditions)}
+    return [named(id) for id, each in policies.items() if not (each.on_request or each.privileged)]
+
+
+def named_contenders(names: str) -> list[Contender]:
+    """Get policies by their names, separated by commas."""
+    chosen = [name.strip() for name in names.split(",") if name.strip()]
     require(len(chosen) > 0, "--policies", names, "one name or more")
     return [named(name) for name in dict.fromkeys(chosen)]
 
@@ -95,8 +104,13 @@ def sampled(arguments: argparse.Namespace) -> bool:
 
 
 def suite_name(arguments: argparse.Namespace) -> str | None:
-    """The name of the chosen suite; None if scenarios are sampled."""
-    return None if sampled(arguments) else arguments.suite or "operation"
+    """The name of the chosen suite; None if scenarios are sampled.
+
+    The conditions of a tier have a suite of their own, as their joint motion is another.
+    """
+    tier = arguments.conditions
+    default = f"operation-{tier}" if tier in TIERS else "operation"
+    return None if sampled(arguments) else arguments.suite or default
 
 
 def seeds(arguments: argparse.Namespace) -> dict[str, Any]:

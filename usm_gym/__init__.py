@@ -11,7 +11,8 @@ from usm_gym.robot import Robot, Thruster
 from usm_gym.suites import suite
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import max_error
-from usm_gym.task.scenario import Inspection, Path, Scenario, Water
+from usm_gym.task.scenario import Inspection, Path, Scenario
+from usm_gym.task.water import Water, Wave
 
 __all__ = [
     "Conditions",
@@ -24,6 +25,7 @@ __all__ = [
     "Scenario",
     "Thruster",
     "Water",
+    "Wave",
     "accelerations",
     "evaluate",
     "linearise",

@@ -97,7 +97,7 @@ def _blocks(
     n, size = robot.links, len(theta)
     blocks = np.tile(body_row(robot, plant), (size, 1))
     quantities = (size, layout.QUANTITIES, layout.padded(n))
-    of_links = blocks[:, layout.HEADER : layout.first_command(n)]
+    of_links = blocks[:, layout.HEADER : layout.row_of(layout.QUANTITIES, n)]
     links = of_links.reshape(quantities)[:, :, :n]
     links[:, layout.THETA] = theta
     links[:, layout.OMEGA] = theta_dot

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -27,6 +27,13 @@ MOST_SAMPLES = 50_000_000
 # Per axis.
 POSITION_METRICS = ("max_error", "settled_error", "rms_error")
 THRUST_METRICS = ("thrust_effort", "thrust_variation", "saturation_share")
+# Shifts of a scan after which the largest errors are kept, per axis: they show what is learned.
+SHIFT_METRICS = {
+    "first_shift_error": 0,
+    "third_shift_error": 2,
+    "fifth_shift_error": 4,
+    "last_shift_error": -1,
+}
 # The row of an episode that is no metric.
 FAILED = "failed"
 
@@ -57,7 +64,7 @@ class Evaluation:
     """Scores of a policy, per episode in the order of the scenarios.
 
     Attributes:
-        per_episode: Values by metric, as `metric_names` lists them, (episodes,).
+        per_episode: Values by metric, (episodes,): what `metric_names` lists for all of them.
         failed: Which episodes lost the robot, (episodes,).
     """
 
@@ -69,12 +76,14 @@ class Evaluation:
         return np.asarray(metrics.objective(self.per_episode, variation_weight))
 
     def summary(self) -> dict[str, Any]:
-        """Mean with interval and worst episode by metric, failures, and all episodes."""
+        """Mean with interval, worst and median episode by metric, losses, and all episodes."""
         row: dict[str, Any] = {}
         for name, values in self.per_episode.items():
             mean, interval = mean_interval(values)
             row[name] = {"mean": mean, "ci95": list(interval), "worst": float(values.max())}
+            row[name]["median"] = float(np.median(values))
         row["failures"] = int(self.failed.sum())
+        row["lost_share"] = float(self.failed.mean())
         row["per_episode"] = {name: values.tolist() for name, values in self.per_episode.items()}
         row["per_episode"]["failed"] = self.failed.tolist()
         return row
@@ -85,7 +94,7 @@ def joined(parts: Sequence[Evaluation]) -> Evaluation:
     return Evaluation(
         per_episode={
             name: np.concatenate([part.per_episode[name] for part in parts])
-            for name in parts[0].per_episode
+            for name in _common([part.per_episode for part in parts])
         },
         failed=np.concatenate([part.failed for part in parts]),
     )
@@ -142,7 +151,7 @@ def evaluate(
         rows = [row for index in sorted(done) for row in done[index]]
     return Evaluation(
         per_episode={
-            name: np.array([row[name] for row in rows]) for name in rows[0] if name != FAILED
+            name: np.array([row[name] for row in rows]) for name in _common(rows) if name != FAILED
         },
         failed=np.array([bool(row[FAILED]) for row in rows]),
     )
@@ -177,38 +186,65 @@ def rollout(
     return [trajectories[index] for index in range(len(scenarios))]
 
 
-def metric_names(world: World) -> list[str]:
-    """Names of the metrics of an episode in a world, in the order of results."""
+def metric_names(world: World, by_shift: bool = False) -> list[str]:
+    """Names of the metrics of an episode in a world, in the order of results.
+
+    Args:
+        world: The world.
+        by_shift: Whether errors by shift are among them: see `scored_by_shift`.
+    """
     position = [f"{name}_{axis}" for name in POSITION_METRICS for axis in world.axes]
-    return [*position, *(f"{angle}_error" for angle in world.attitude), *THRUST_METRICS]
+    shifts = [f"{name}_{axis}" for name in SHIFT_METRICS for axis in world.axes]
+    angles = [f"{angle}_error" for angle in world.attitude]
+    return [*position, *angles, *THRUST_METRICS, *(shifts if by_shift else ())]
+
+
+def scored_by_shift(scenario: Any) -> bool:
+    """Whether an episode has scores by shift, as a scan has: five shifts or more, none too late."""
+    shifts = scenario.shifts
+    return len(shifts) > max(SHIFT_METRICS.values()) and bool(shifts[-1] <= scenario.duration)
 
 
 def score(trajectory: Trajectory) -> dict[str, float | bool]:
     """The metrics of an episode; a lost one counts as at least 0.5 m in all axes."""
-    scenario, time, error = trajectory.scenario, trajectory.time, trajectory.error
-    world, settle = world_of(scenario.body), scenario.settle_time
-    names = metric_names(world)[: len(POSITION_METRICS) * len(world.axes)]
-    row: dict[str, float | bool]
-    if trajectory.lost:
-        row = dict.fromkeys(names, max(world.lost_error, float(np.abs(error).max())))
-        counted = np.ones(len(time), bool)
-    else:
-        values = [
-            metrics.max_error(time, error, settle),
-            metrics.settled_error(time, error, scenario.shifts, settle),
-            metrics.rms_error(time, error, settle),
-        ]
-        row = dict(zip(names, np.concatenate(values).tolist(), strict=True))
-        counted = time >= settle
-    for k, angle in enumerate(world.attitude):
-        row[f"{angle}_error"] = float(np.abs(trajectory.attitude_error[counted, k]).max())
-    period, limit = scenario.conditions.control_period, scenario.conditions.thruster_limit
-    return row | {
-        "thrust_effort": metrics.thrust_effort(trajectory.command),
-        "thrust_variation": metrics.thrust_variation(trajectory.command, period),
-        "saturation_share": metrics.saturation_share(trajectory.command, limit),
-        FAILED: trajectory.lost,
+    scenario, lost = trajectory.scenario, trajectory.lost
+    world, conditions = world_of(scenario.body), scenario.conditions
+    found = {
+        f"{name}_{axis}": float(error)
+        for name, errors in _position_errors(trajectory).items()
+        for axis, error in zip(world.axes, errors, strict=True)
     }
+    counted = (trajectory.time >= scenario.settle_time) | lost
+    for k, angle in enumerate(world.attitude):
+        found[f"{angle}_error"] = float(np.abs(trajectory.attitude_error[counted, k]).max())
+    values = (
+        metrics.thrust_effort(trajectory.command),
+        metrics.thrust_variation(trajectory.command, conditions.control_period),
+        metrics.saturation_share(trajectory.command, conditions.thruster_limit),
+    )
+    found |= dict(zip(THRUST_METRICS, values, strict=True))
+    names = metric_names(world, scored_by_shift(scenario))
+    return {**{name: found[name] for name in names}, FAILED: lost}
+
+
+def _position_errors(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
+    """Position errors of an episode by metric, m, (axes,)."""
+    scenario, time, error = trajectory.scenario, trajectory.time, trajectory.error
+    settle, shifts, by_shift = scenario.settle_time, scenario.shifts, scored_by_shift(scenario)
+    names = [*POSITION_METRICS, *(SHIFT_METRICS if by_shift else ())]
+    if trajectory.lost:
+        world = world_of(scenario.body)
+        worst = max(world.lost_error, float(np.abs(error).max()))
+        return {name: np.full(len(world.axes), worst) for name in names}
+    values = [
+        metrics.max_error(time, error, settle),
+        metrics.settled_error(time, error, shifts, settle, metrics.recovery_from(shifts)),
+        metrics.rms_error(time, error, settle),
+    ]
+    if by_shift:
+        after = metrics.shift_errors(time, error, shifts)
+        values += [after[shift] for shift in SHIFT_METRICS.values()]
+    return dict(zip(names, values, strict=True))
 
 
 class _Recording:
@@ -337,6 +373,11 @@ def _times(scenario: Any, samples: int) -> NDArray[np.float64]:
     """The ends of the first control periods of an episode, s."""
     period: float = scenario.conditions.control_period
     return np.arange(1, samples + 1, dtype=np.float64) * period
+
+
+def _common(tables: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The names that all tables have, in the order of the first."""
+    return [name for name in tables[0] if all(name in table for table in tables)]
 
 
 def _scores(

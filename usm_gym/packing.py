@@ -21,7 +21,7 @@ def plant_of(
     hydrodynamics: Hydrodynamics = "consistent",
     drag: Drag = "linear and quadratic",
     shifts: int = 0,
-    moving_water: bool = False,
+    sinusoids: int = 0,
 ) -> Plant:
     """What all copies of a robot share.
 
@@ -34,7 +34,7 @@ def plant_of(
         hydrodynamics: Form of the added mass.
         drag: Terms of the drag.
         shifts: Largest number of changes of the joint references in any episode.
-        moving_water: Whether the water's velocity changes in any episode.
+        sinusoids: Largest number of sinusoids in the water's velocity in any episode.
     """
     return Plant(
         l=robot.half_length,
@@ -49,7 +49,7 @@ def plant_of(
         h=step,
         substeps=substeps,
         shifts=shifts,
-        moving_water=moving_water,
+        sinusoids=sinusoids,
     )
 
 
@@ -61,6 +61,9 @@ def body_row(
     joint_gains: tuple[float, float] | None = None,
     filter_frequency: float = 0.0,
     time_constant: float = 0.0,
+    dead_band: float = 0.0,
+    link_factors: ArrayLike = 1.0,
+    thruster_gains: ArrayLike = 1.0,
 ) -> NDArray[np.float64]:
     """The rows of a robot at rest in still water, straight, nothing being asked of its joints.
 
@@ -71,9 +74,12 @@ def body_row(
         joint_gains: Stiffness and damping of the joints other than the robot's, N m/rad, N m s/rad.
         filter_frequency: Natural frequency of the joint references' filter, rad/s; 0 for none.
         time_constant: First-order lag of the thrusters, s.
+        dead_band: Smallest force that the thrusters make, N.
+        link_factors: Coefficients of each link over those common to all, (links,).
+        thruster_gains: Force of each thruster over its command, (thrusters,).
     """
-    links = robot.links
-    row = np.zeros(rows.body_rows(links, len(robot.thrusters)))
+    links, thrusters = robot.links, len(robot.thrusters)
+    row = np.zeros(rows.body_rows(links, thrusters))
     row[rows.C_T : rows.LAMBDA_3 + 1] = np.multiply(robot.hydrodynamic_coefficients, coefficients)
     k_p, k_d = joint_gains or (robot.joint_stiffness, robot.joint_damping)
     row[rows.STIFFNESS], row[rows.DAMPING] = k_p, k_d
@@ -82,5 +88,10 @@ def body_row(
     row[side : side + links] = rows.sides(links)
     row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(filter_frequency, plant.h)
     row[rows.SHIFT_STEP : rows.SHIFT_SIZE] = rows.NEVER
+    factor = rows.row_of(rows.FACTOR, links)
+    row[factor : factor + links] = link_factors
     row[rows.LAG], row[rows.MEAN_LAG] = lag_shares(time_constant, plant.h)
+    row[rows.DEAD_BAND] = dead_band
+    gain = rows.thruster_row(rows.GAIN, links, thrusters)
+    row[gain : gain + thrusters] = thruster_gains
     return row

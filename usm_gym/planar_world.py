@@ -21,12 +21,21 @@ from usm_gym.plant.thrusters import command
 from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task import guidance
-from usm_gym.task.observation import ObservationLayout, allocations, find_error, measure
+from usm_gym.task.observation import (
+    ENTRY,
+    ObservationLayout,
+    allocations,
+    find_error,
+    measure,
+    measure_age,
+    number,
+)
 from usm_gym.task.scenario import Scenario
 from usm_gym.world import Array, Kernels, World, world_of
 
 # Physics steps times links of the longest episode; at a step of 1e-3 s, 16 links swim 35 hours.
 MOST_LINK_STEPS = 2_000_000_000
+AXES = 2
 
 
 @compiled
@@ -34,17 +43,33 @@ def observe(fleet, plant, table, robot, lanes):
     """Measure one robot; not a `piece`, which would slow down what it is inlined in."""
     row, lane, instant = fleet.blocks[robot // lanes], robot % lanes, fleet.instant[robot]
     # A robot whose episode has ended may be stepped on until it is restarted.
-    noise = fleet.noise[robot, min(instant, fleet.noise.shape[1] - 1)]
+    now = min(instant, fleet.steps[robot])
     error, past = fleet.error[robot], fleet.past[robot]
     reference = find_error(row, lanes, lane, plant, error)
-    # Before the first measurement arrives, that of the start is known.
-    seen = past[max(instant - fleet.late[robot], 0) % past.shape[0]]
     kept = past[instant % past.shape[0]]
-    for axis in range(error.size):
+    for axis in range(AXES):
         kept[axis] = error[axis]
+        kept[AXES + axis] = number(row, lanes, lane, rows.V_X + axis)
+    at = fleet.taken[robot, now, 0]
+    seen, noise = past[(instant - (now - at)) % past.shape[0]], fleet.noise[robot, at]
     measured = seen[0] + noise[0], seen[1] + noise[1]
-    angles, observation = fleet.attitude_error[robot], fleet.observation[robot]
-    measure(row, lanes, lane, plant, reference, measured, table, angles, observation)
+    others, angles = fleet.other_noise[robot, now], fleet.attitude_error[robot]
+    observation = fleet.observation[robot]
+    measure(row, lanes, lane, plant, reference, measured, others[AXES:], table, angles, observation)
+    period = plant.substeps * plant.h
+    measure_age(ENTRY.position_age, (now - at) * period, table, observation)
+    at = fleet.taken[robot, now, 1]
+    age, k = -1.0, table.starts[ENTRY.velocity]
+    observation[k], observation[k + 1] = 0.0, 0.0
+    if at >= 0:
+        age = (now - at) * period
+        seen, noises = past[(instant - (now - at)) % past.shape[0]], fleet.other_noise[robot, at]
+        for axis in range(AXES):
+            velocity = seen[AXES + axis] + noises[axis]
+            observation[k + axis] = velocity * table.gain[k + axis]
+    measure_age(ENTRY.velocity_age, age, table, observation)
+    for k in range(observation.size):
+        observation[k] = min(max(observation[k], -table.bound[k]), table.bound[k])
 
 
 @piece
@@ -129,12 +154,13 @@ class PlanarWorld(World):
         """Rows by name; vectors in the global frame, angles from the tail, SI units.
 
         `position`, `velocity` and `acceleration` are those of the centre of mass, `force` has the
-        thrusters' forces, which lag behind `command`, `coefficients` the true hydrodynamic ones;
+        thrusters' forces, which lag behind `command` and have its size times `thruster_gains`,
+        `coefficients` the true hydrodynamic ones, which link i has times `link_factors[i]`;
         joint i is asked for `joint_shares[i] * deflection`. `acceleration`, what pushes the links,
         `sine` and `cosine` of their angles and the water are of the middle of the last step.
         """
         links = self.links
-        first = rows.first_command(links)
+        thrusters = self.thrusters
         starts = {
             "position": (rows.P_X, 2),
             "velocity": (rows.V_X, 2),
@@ -149,8 +175,10 @@ class PlanarWorld(World):
             "push_across": (rows.row_of(rows.PUSH_N, links), links),
             "sine": (rows.row_of(rows.SIN, links), links),
             "cosine": (rows.row_of(rows.COS, links), links),
-            "command": (first, self.thrusters),
-            "force": (first + self.thrusters, self.thrusters),
+            "link_factors": (rows.row_of(rows.FACTOR, links), links),
+            "command": (rows.thruster_row(rows.COMMAND, links, thrusters), thrusters),
+            "force": (rows.thruster_row(rows.FORCE, links, thrusters), thrusters),
+            "thruster_gains": (rows.thruster_row(rows.GAIN, links, thrusters), thrusters),
         }
         return {name: slice(row, row + size) for name, (row, size) in starts.items()}
 
@@ -158,12 +186,19 @@ class PlanarWorld(World):
         """Refuse a scenario that the robot cannot swim.
 
         Raises:
-            ValueError: If more joints shall bend than it has, or the episode is too much work.
+            ValueError: If more joints shall bend than it has, factors or gains do not match its
+                links and thrusters, or the episode is too much work.
         """
         joints = self.links - 1
         bending = scenario.inspection.bending_joints
         allowed = f"1 to {joints}, the robot's joints"
         require(bending <= joints, "bending_joints", bending, allowed)
+        factors, gains = scenario.water.link_factors, scenario.thruster_gains
+        fitting = len(factors) in (0, self.links)
+        require(fitting, "link_factors", factors, f"none, or one for each of {self.links} links")
+        fitting = len(gains) in (0, self.thrusters)
+        allowed = f"none, or one for each of {self.thrusters} thrusters"
+        require(fitting, "thruster_gains", gains, allowed)
         steps = scenario.steps * scenario.conditions.substeps
         longest = MOST_LINK_STEPS // self.links * scenario.conditions.physics_step
         require(
@@ -184,12 +219,17 @@ class PlanarWorld(World):
             joint_gains=scenario.joint_gains,
             filter_frequency=motion.filter_frequency or 0.0,
             time_constant=conditions.thruster_time_constant,
+            dead_band=conditions.thruster_dead_band,
+            link_factors=water.link_factors or 1.0,
+            thruster_gains=scenario.thruster_gains or 1.0,
         )
         row[rows.WATER_X : rows.WATER_Y + 1] = water.current
         row[rows.MEAN_X : rows.MEAN_Y + 1] = water.current
-        row[rows.AMPLITUDE_X : rows.AMPLITUDE_Y + 1] = water.amplitude
-        row[rows.PHASE_X : rows.PHASE_Y + 1] = water.phase
-        row[rows.WATER_FREQUENCY] = 2 * np.pi / water.period
+        slow = (water.amplitude, water.phase, water.period)
+        waves = ((wave.amplitude, (wave.phase, wave.phase), wave.period) for wave in water.waves)
+        for k, (amplitude, phase, period) in enumerate((slow, *waves)):
+            first = rows.SINUSOID + k * rows.SINUSOID_ROWS
+            row[first : first + rows.SINUSOID_ROWS] = *amplitude, *phase, 2 * np.pi / period
         share = rows.row_of(rows.SHARE, links) + links - 1 - motion.bending_joints
         row[share : share + motion.bending_joints] = 1.0 / motion.bending_joints
         shifts = len(scenario.shifts)
@@ -207,11 +247,11 @@ class PlanarWorld(World):
 
     def shared(self, scenario: Scenario, previous: Plant | None) -> Plant:
         """What all robots share; as many changes of the joint references as any of them has."""
-        shifts, moving = len(scenario.shifts), any(scenario.water.amplitude)
+        shifts, sinusoids = len(scenario.shifts), scenario.water.sinusoids
         if previous is not None:
-            if shifts <= previous.shifts and moving <= previous.moving_water:
+            if shifts <= previous.shifts and sinusoids <= previous.sinusoids:
                 return previous
-            shifts, moving = max(shifts, previous.shifts), moving or previous.moving_water
+            shifts, sinusoids = max(shifts, previous.shifts), max(sinusoids, previous.sinusoids)
         conditions = scenario.conditions
         return plant_of(
             self.robot,
@@ -221,7 +261,7 @@ class PlanarWorld(World):
             hydrodynamics=conditions.hydrodynamics,
             drag=conditions.drag,
             shifts=shifts,
-            moving_water=moving,
+            sinusoids=sinusoids,
         )
 
     def truth(self, read: Callable[[str], Array]) -> dict[str, Array]:

@@ -29,7 +29,7 @@ class Snapshot:
     Attributes:
         scenarios: The scenarios in progress.
         arrays: The state.
-        past: Position errors that are still to be measured, m, (size, instants, axes).
+        past: What is still to be measured, see `usm_gym.world.Fleet`.
         commands: Commands that are still to take effect, (size, periods, thrusters).
     """
 
@@ -91,11 +91,13 @@ class Simulation:
         self.effort, self.limit = np.zeros(self.size), np.zeros(self.size)
         self.lost = np.zeros(self.size, bool)
         self._settled = np.zeros(self.size, np.int64)
-        self._late, self._past = np.zeros(self.size, np.int64), np.zeros((self.size, 1, axes))
+        self._past = np.zeros((self.size, 1, 2 * axes))
         # Commands that have not taken effect yet; those of period i at i modulo their number.
         self._wait = np.zeros(self.size, np.int64)
         self._commands = np.zeros((self.size, 1, self.world.thrusters), np.float32)
-        self._noise = np.zeros((self.size, max(s.steps for s in scenarios) + 1, axes))
+        self._taken = np.zeros((self.size, 1, 2), np.int32)
+        self._noise = np.zeros((self.size, 1, axes))
+        self._other_noise = np.zeros((self.size, 1, 0), np.float32)
         self._threads = min(threads, blocks, numba.config.NUMBA_NUM_THREADS)
         self._share_out()
         for index, scenario in enumerate(scenarios):
@@ -151,15 +153,14 @@ class Simulation:
         self.limit[index] = scenario.conditions.thruster_limit
         self.lost[index] = False
         self.shared = self.world.shared(scenario, self.shared)
-        noise, conditions = scenario.noise(), scenario.conditions
-        self._late[index], self._wait[index] = conditions.position_delay, conditions.action_delay
-        missing = len(noise) - self._noise.shape[1]
-        if missing > 0:
-            self._noise = np.pad(self._noise, ((0, 0), (0, missing), (0, 0)))
-        self._past = _with_room(self._past, conditions.position_delay + 1, self.count)
+        measured, conditions = scenario.sensing(), scenario.conditions
+        self._wait[index] = conditions.action_delay
+        self._past = _with_room(self._past, measured.oldest + 1, self.count)
         self._commands = _with_room(self._commands, conditions.action_delay + 1, self.count)
+        self._taken = _written(self._taken, index, measured.taken)
+        self._noise = _written(self._noise, index, measured.position)
+        self._other_noise = _written(self._other_noise, index, measured.others)
         self._share_out()
-        self._noise[index, : len(noise)] = noise
         self._commands[index] = 0.0
         self.world.kernels.observe(
             self.fleet, self.shared, self.layout.kernel_table, index, self._lanes
@@ -225,8 +226,10 @@ class Simulation:
         self.fleet = Fleet(
             blocks=self._rows.reshape(len(self._rows), -1),
             instant=self.count,
+            steps=self.steps,
+            taken=self._taken,
             noise=self._noise,
-            late=self._late,
+            other_noise=self._other_noise,
             past=self._past,
             settled=self._settled,
             error=self.error,
@@ -235,6 +238,20 @@ class Simulation:
             effort=self.effort,
             observation=self.observation,
         )
+
+
+def _written(kept: NDArray[Any], index: int, values: NDArray[Any]) -> NDArray[Any]:
+    """What is kept of all robots, (size, instants, numbers), with new values of one of them.
+
+    There is room for the most instants and numbers of any. Nothing reads a robot's instants after
+    its last one; numbers that it lacks are 0.
+    """
+    instants, numbers = values.shape
+    room = [max(instants - kept.shape[1], 0), max(numbers - kept.shape[2], 0)]
+    if any(room):
+        kept = np.pad(kept, ((0, 0), (0, room[0]), (0, room[1])))
+    kept[index, :instants, :numbers], kept[index, :instants, numbers:] = values, 0
+    return kept
 
 
 def _with_room(kept: NDArray[Any], length: int, count: NDArray[np.int64]) -> NDArray[Any]:

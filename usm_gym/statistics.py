@@ -14,7 +14,8 @@ vary less than all there could be: an interval of five covers some 87 % where se
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -183,11 +184,20 @@ def _interval(statistic: Callable[..., Any], *sizes: int) -> Interval:
         sizes: How many there are of each kind.
     """
     rng = np.random.default_rng(0)
-    drawn = [rng.integers(size, size=(RESAMPLES, size)) for size in sizes]
-    parts = zip(*(np.array_split(indices, PARTS) for indices in drawn), strict=True)
-    values = np.concatenate([statistic(*part) for part in parts])
+    kinds = []
+    for size in sizes:
+        kinds.append(_draws(deepcopy(rng), size))
+        for _ in _draws(rng, size):  # all of a kind are drawn before the next kind
+            pass
+    values = np.concatenate([statistic(*part) for part in zip(*kinds, strict=True)])
     low, high = np.quantile(values, (0.025, 0.975))
     return float(low), float(high)
+
+
+def _draws(rng: np.random.Generator, size: int) -> Iterator[NDArray[np.int64]]:
+    """Draw indices below `size` part by part, (resamples of the part, size)."""
+    for part in np.array_split(np.arange(RESAMPLES), PARTS):
+        yield rng.integers(size, size=(part.size, size))
 
 
 def _crossed(table: Array, seeds: Any, episodes: Any) -> Array:

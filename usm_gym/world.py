@@ -21,6 +21,7 @@ from usm_gym.task.conditions import Conditions
 from usm_gym.task.loss import LOST_ERROR, find_lost
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.reward import reward, reward_of_loss
+from usm_gym.task.sensing import Sensing
 
 Array = NDArray[np.float64]
 
@@ -32,10 +33,16 @@ class Fleet(NamedTuple):
         blocks: Numbers of all robots, (blocks, rows * lanes); a row holds one number
             for every robot of the block.
         instant: Control periods since the start, int64, (size,).
-        noise: Measurement errors of the position, m, (size, control instants, axes).
-        late: By how many control periods the measured position is late, int64, (size,).
-        past: True position errors of the last control instants, m, (size, instants, axes): that of
-            instant i at i modulo their number, which is larger than any `late`.
+        steps: Control periods of the episode, after which nothing is drawn, int64, (size,).
+        taken: At which control instant the position and the velocity that are known at an instant
+            were measured, int32, (size, control instants, 2); -1 where nothing measures it.
+        noise: Errors of positions that are measured at an instant, m, (size, control instants,
+            axes).
+        other_noise: The same of velocities, angles and rates, float32, see
+            `usm_gym.task.sensing.Sensing`, (size, control instants, numbers).
+        past: True position errors, m, and velocities, m/s, of the last control instants, (size,
+            instants, 2 axes): those of instant i at i modulo their number, which is larger than the
+            age of any measurement.
         settled: Control period from which on errors count, int64, (size,).
         error: True position errors, m, (size, axes).
         max_error: Their largest absolute values since settling, m, (size, axes).
@@ -46,8 +53,10 @@ class Fleet(NamedTuple):
 
     blocks: Array
     instant: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    taken: NDArray[np.int32]
     noise: Array
-    late: NDArray[np.int64]
+    other_noise: NDArray[np.float32]
     past: Array
     settled: NDArray[np.int64]
     error: Array
@@ -109,8 +118,8 @@ class Episode(Protocol):
     def shifts(self) -> tuple[float, ...]:
         """When the body is asked to move, s; metrics leave a while after them out."""
 
-    def noise(self) -> Array:
-        """Measurement errors of the position at every control instant, m, (steps + 1, axes)."""
+    def sensing(self) -> Sensing:
+        """When its sensors measure, and how wrong they are."""
 
 
 class Sampler(Protocol):

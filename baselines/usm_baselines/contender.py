@@ -46,6 +46,7 @@ class Contender:
         note: What to bear in mind about its scores.
         identity: What its scores depend on besides scenarios and nominal knowledge; None where that
             is not known, as for the code of others.
+        tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Contender:
     told: str = ""
     note: str = ""
     identity: str | None = None
+    tuned_for: str = ""
 
     @property
     def refusals(self) -> tuple[type[BaseException], ...]:
@@ -121,7 +123,15 @@ def registered(name: str, entry: Registration) -> Contender:
         sources = fingerprint("usm_gym", "usm_baselines", package)
         where = [factory.__module__, factory.__qualname__]
         identity = json.dumps([where, settings, sources], sort_keys=True)
-    return Contender(name, entry.factory, entry.privileged, entry.told, entry.note, identity)
+    return Contender(
+        name,
+        entry.factory,
+        entry.privileged,
+        entry.told,
+        entry.note,
+        identity,
+        entry.tuned_for,
+    )
 
 
 def own(name: str) -> Callable[..., Any]:

@@ -10,14 +10,16 @@ from pydantic import Field, TypeAdapter
 
 from usm_gym.support.files import read_json
 from usm_gym.support.validation import Count, Number, explaining
+from usm_gym.task.conditions import Conditions, preset_of
 
 # Of any law, in its own unit.
 Gain = Annotated[Number, Field(ge=-1e12, le=1e12)]
 
-# Shipped gains: ID.json is registered as ID-tuned; those in FRONT were tuned with other weights on
-# thrust variation, and show what a law can do at less or more of it.
+# Shipped gains: ID.json in the folder of a suffix is registered as ID-SUFFIX. Those in FRONT were
+# tuned with other weights on thrust variation, and show what a law can do at less or more of it.
 TUNED = Path(__file__).with_name("tuned")
 FRONT = TUNED / "front"
+FOLDERS = {"tuned": "", "basin": "basin", "sea": "sea"}
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,19 @@ class GainsFile:
         gains: Its gains by name, -1e12 to 1e12; those not named are the policy's own.
         budget: What the tuning cost.
         weight: Cost of thrust variation in the objective, 0 to 1000 mm per N/s.
+        conditions: Those of the scenarios; None if it does not say.
     """
 
     policy: str
     gains: dict[str, Gain]
     budget: Budget
     weight: Annotated[Number, Field(ge=0, le=1000)]
+    conditions: Conditions | None = None
+
+    @property
+    def tuned_for(self) -> str:
+        """The preset that the conditions are; empty if they are none."""
+        return preset_of(self.conditions)
 
 
 _ADAPTER = TypeAdapter(GainsFile)

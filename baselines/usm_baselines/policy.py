@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from usm_baselines.estimation.navigator import ACCELERATION_NOISE, DISTURBANCE_NOISE, Navigator
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Gain, declared
 from usm_gym.robot import Robot
@@ -47,13 +48,22 @@ class ScriptedPolicy:
     # Whether the law computes with the inertia, drag or plant of the planar robot.
     planar = False
 
-    def __init__(self, nominal: Nominal, *, lag: bool = False, **gains: float) -> None:
+    def __init__(
+        self,
+        nominal: Nominal,
+        *,
+        lag: bool = False,
+        navigated: bool = False,
+        **gains: float,
+    ) -> None:
         """Take gains other than the defaults by name.
 
         Args:
             nominal: What the policy knows of the robot.
             lag: Whether the applied force that the law is fed lags behind the commands as it
                 nominally does; without it, it is the command itself, as in the paper.
+            navigated: Whether a navigator estimates the error and its rate for the law; without it,
+                the law takes the last position as it was measured.
             gains: Gains other than the defaults, by name.
 
         Raises:
@@ -70,11 +80,18 @@ class ScriptedPolicy:
         self.gains = self.Gains(*map(float, chosen))
         self._world, self._model = world_of(nominal.robot), model_of(nominal, lag)
         # Before the law's own numbers stand those that all laws share.
-        self._own = shared_size(self._model)
+        self._shared = shared_size(self._model)
+        self._navigator = Navigator(nominal, *self.densities) if navigated else None
+        self._own = self._shared + (self._navigator.size if self._navigator else 0)
         # Laws of the planar robot model the lag themselves.
         require(not (lag and self.planar), "lag", lag, "False for a law that models it")
         fitting = isinstance(nominal.robot, Robot) or not self.planar
         require(fitting, "robot", nominal.robot, "the planar robot")
+
+    @property
+    def densities(self) -> tuple[float, float]:
+        """Spectral densities of the noise that a navigator assumes, see `Navigator`."""
+        return ACCELERATION_NOISE, DISTURBANCE_NOISE
 
     @property
     def columns(self) -> dict[str, NDArray[np.int64]]:
@@ -139,8 +156,12 @@ class ScriptedPolicy:
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         size = len(observation)
-        signals = signals_of(observation, self._model, self._world)
+        navigator = self._navigator
+        signals = signals_of(observation, self._model, self._world, navigator is not None)
         sense(state, self._model, signals)
+        if navigator is not None:
+            memory = state[:, self._shared : self._own]
+            navigator.estimate(signals, self._model.mass, memory)
         own = state[:, self._own :].copy().reshape(size, *self.law_shape)
         force = np.empty_like(signals.y)
         self.control(signals, own, force)

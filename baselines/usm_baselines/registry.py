@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from usm_baselines.gains import TUNED, GainsFile, read_gains
+from usm_baselines.gains import FOLDERS, TUNED, GainsFile, read_gains
+from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
 from usm_baselines.laws.generalised_super_twisting import (
     AdaptiveGeneralisedSuperTwisting,
     GeneralisedSuperTwisting,
 )
+from usm_baselines.laws.informed_lqg import InformedLQG
 from usm_baselines.laws.joint_lqg import JointLQG
 from usm_baselines.laws.ladrc import LADRC
 from usm_baselines.laws.lqg import LQG
@@ -45,6 +47,7 @@ class Registration:
         on_request: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
         note: What to bear in mind about its scores; empty if nothing.
+        tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
     """
 
     factory: Callable[..., Policy]
@@ -54,6 +57,7 @@ class Registration:
     on_request: bool = False
     privileged: bool = False
     note: str = ""
+    tuned_for: str = ""
 
 
 _entries: dict[str, Registration] = {}
@@ -70,7 +74,7 @@ def register(
     privileged: bool = False,
     note: str = "",
 ) -> None:
-    """Register a policy, and beside it as `ID-tuned` the same with the gains that we ship for it.
+    """Register a policy, and as `ID-tuned`, `ID-basin`, `ID-sea` the same with shipped gains.
 
     Args:
         id: Its name.
@@ -80,8 +84,8 @@ def register(
         space: The gains that are tuned, by name, and where; without it, as the `Gains` of a
             `ScriptedPolicy` declare, and none of another factory.
         told: What it is told besides the measured position and the reference.
-        on_request: Whether to leave it out of evaluations unless it is asked for; its tuned form
-            is not left out.
+        on_request: Whether to leave it out of evaluations unless it is asked for; its tuned forms
+            are not left out.
         privileged: Whether it is given true state.
         note: What to bear in mind about its scores.
 
@@ -91,9 +95,10 @@ def register(
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
     _entries[id] = Registration(factory, summary, chosen, told, on_request, privileged, note)
-    shipped = TUNED / f"{id}.json"
-    if shipped.is_file():
-        _entries[f"{id}-tuned"] = tuned(read_gains(shipped))
+    for suffix, folder in FOLDERS.items():
+        shipped = TUNED / folder / f"{id}.json"
+        if shipped.is_file():
+            _entries[f"{id}-{suffix}"] = tuned(read_gains(shipped))
 
 
 def _declared_space(factory: Any) -> Space:
@@ -135,6 +140,7 @@ def tuned(file: GainsFile) -> Registration:
         told=base.told,
         privileged=base.privileged,
         note=base.note,
+        tuned_for=file.tuned_for,
     )
 
 
@@ -196,6 +202,7 @@ def nominal_knowledge(env: Any) -> Nominal:
 
 # What laws are told besides the measured position and the reference.
 LAG = "lag"
+NAVIGATED = "lag, noise, delays, straight body"
 BODY, FORESIGHT = "lag, noise, straight body", "lag, noise, nominal plant, joint references"
 
 register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
@@ -245,6 +252,17 @@ for _id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "ladrc", "smc
         space=_law.space,
         on_request=True,
     )
+# The paper's first case (9), and others with it: position and velocity from the navigator.
+for _id in ("sta", "pd", "pid", "smc"):
+    _law = _entries[_id]
+    register(
+        f"{_id}-navigator",
+        partial(_law.factory, navigated=True),
+        f"{_id} on the navigator's position and velocity",
+        told=NAVIGATED,
+        space=_law.space,
+        on_request=True,
+    )
 register(
     "lqg",
     LQG,
@@ -256,6 +274,19 @@ register(
     JointLQG,
     "the same with the joint motion foreseen by the nominal plant",
     told=FORESIGHT,
+)
+register(
+    "adaptive",
+    AdaptiveLQG,
+    "the same, with coefficients, current and thruster gains identified on the way",
+    told=FORESIGHT,
+)
+register(
+    "informed",
+    InformedLQG,
+    "lqg-joints, told what is constant in an episode: what identification could bring",
+    told="all constants of the episode",
+    privileged=True,
 )
 register("mpc", MPC, "predictive control on the nominal plant, joint motion known", told=FORESIGHT)
 register(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import compiled, piece, shared
-from usm_gym.plant.thrusters import allocate, lag_shares
+from usm_gym.plant.thrusters import allocate, delivered, lag_shares
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import World, world_of
 
@@ -37,6 +37,8 @@ class Model(NamedTuple):
         attitude_error: The same.
         thruster_command: The same.
         thruster_limit: The same.
+        position_age: The same; -1 if positions have no age.
+        dead_band: Commands below this make no force, N.
     """
 
     axes: int
@@ -53,6 +55,8 @@ class Model(NamedTuple):
     attitude_error: int
     thruster_command: int
     thruster_limit: int
+    position_age: int
+    dead_band: float
 
 
 class Signals(NamedTuple):
@@ -60,7 +64,12 @@ class Signals(NamedTuple):
 
     Attributes:
         started: 0.0 at the first call of an episode, else 1.0, (batch,).
-        y: Measured position error, m, (batch, axes).
+        fresh: Whether the position has just been measured, (batch,).
+        navigated: Whether a navigator estimates what follows.
+        y: Measured position error, m, (batch, axes); with a navigator, its estimate.
+        rate: The navigator's estimate of the error's rate, m/s, (batch, axes).
+        disturbance: That of what the nominal model leaves out, m/s^2, (batch, axes).
+        thrust: That of the thrust over the inertia, m/s^2, (batch, axes).
         u: Applied force over the mass less the reference's acceleration, m/s^2, (batch, axes).
         velocity: Velocity of the reference, m/s, (batch, axes).
         acceleration: Acceleration of the reference, m/s^2, (batch, axes).
@@ -69,7 +78,12 @@ class Signals(NamedTuple):
     """
 
     started: Array
+    fresh: NDArray[np.bool_]
+    navigated: bool
     y: Array
+    rate: Array
+    disturbance: Array
+    thrust: Array
     u: Array
     velocity: Array
     acceleration: Array
@@ -105,6 +119,8 @@ def model_of(nominal: Nominal, lag: bool = False) -> Model:
         attitude_error=first[angles[0]] if angles else layout.size,
         thruster_command=first["thruster_command"],
         thruster_limit=first["thruster_limit"],
+        position_age=first.get("position_age", -1),
+        dead_band=nominal.thruster_dead_band,
     )
 
 
@@ -116,9 +132,10 @@ def physical(observation, model, index):
 
 @piece
 def commanded(observation, model, thruster):
-    """Command of a thruster that is in effect, after saturation, N."""
+    """Force that the command of a thruster in effect nominally leads to, N."""
     limit = physical(observation, model, model.thruster_limit)
-    return physical(observation, model, model.thruster_command + thruster) * limit
+    command = physical(observation, model, model.thruster_command + thruster) * limit
+    return delivered(command, 1.0, model.dead_band)
 
 
 @compiled
@@ -134,6 +151,8 @@ def sense(state, model, signals):
     for b in range(signals.observation.shape[0]):
         seen = signals.observation[b]
         signals.started[b] = state[b, 0]
+        age = model.position_age
+        signals.fresh[b] = age < 0 or physical(seen, model, age) == 0.0
         for j in range(model.thrusters):
             last = state[b, forces + j]
             way = commanded(seen, model, j) - last
@@ -182,10 +201,25 @@ def shared_size(model: Model) -> int:
     return 1 + (model.axes + 1) * model.thrusters
 
 
-def signals_of(observation: NDArray[np.float32], model: Model, world: World) -> Signals:
-    """Signals of a batch, of which `sense` fills in all but the allocation."""
+def signals_of(
+    observation: NDArray[np.float32], model: Model, world: World, navigated: bool = False
+) -> Signals:
+    """Signals of a batch; the allocation is in, `sense` and a navigator fill in the rest."""
     size = len(observation)
-    y, u, velocity, acceleration = np.empty((4, size, model.axes))
+    y, u, velocity, acceleration, rate, disturbance, thrust = np.empty((7, size, model.axes))
     allocation = np.empty((size, model.axes + model.angles, model.thrusters))
     world.allocate(observation, allocation)
-    return Signals(np.empty(size), y, u, velocity, acceleration, allocation, observation)
+    return Signals(
+        started=np.empty(size),
+        fresh=np.empty(size, np.bool_),
+        navigated=navigated,
+        y=y,
+        rate=rate,
+        disturbance=disturbance,
+        thrust=thrust,
+        u=u,
+        velocity=velocity,
+        acceleration=acceleration,
+        allocation=allocation,
+        observation=observation,
+    )

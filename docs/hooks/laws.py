@@ -16,7 +16,12 @@ from usm_gym.support.text import figures as in_figures
 from usm_gym.support.text import mm
 
 LEADERBOARD = Path(__file__).parents[2] / "results" / usm_gym.__version__ / "leaderboard.json"
-SHOWN = {"operation": "field", "operation-ideal": "ideal", "operation-rough": "rough"}
+SHOWN = {
+    "operation": "field",
+    "operation-ideal": "ideal",
+    "operation-basin": "basin",
+    "operation-sea": "sea",
+}
 # Where a page has `<!-- law: ID, ID -->`, for policies that share a class of gains.
 PLACE = re.compile(r"<!-- law: (.+?) -->")
 

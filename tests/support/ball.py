@@ -15,6 +15,7 @@ from usm_gym.plant.thrusters import saturated
 from usm_gym.sensors import Entry, Layout
 from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.sensing import sensing
 from usm_gym.world import Kernels, World, world_of
 
 # Rows: position and velocity, last commands, thruster limit, the path's speed, physics steps.
@@ -32,7 +33,7 @@ class Shared(NamedTuple):
 def observe(fleet, shared, table, k, lanes):
     row, lane, seen = fleet.blocks[k // lanes], k % lanes, fleet.observation[k]
     t, speed = row[CLOCK * lanes + lane] * shared.h, row[SPEED * lanes + lane]
-    noise = fleet.noise[k, min(fleet.instant[k], fleet.noise.shape[1] - 1)]
+    noise = fleet.noise[k, min(fleet.instant[k], fleet.steps[k])]
     for axis in range(3):
         share = speed / (1.0 + axis)
         fleet.error[k, axis] = row[(P + axis) * lanes + lane] - share * t
@@ -109,8 +110,8 @@ class BallScenario:
     steps = property(lambda self: round(self.duration / self.conditions.control_period))
     nominal = property(lambda self: Nominal(self.robot, self.conditions.control_period, 0.0, 5e-5))
 
-    def noise(self):
-        return 5e-5 * np.random.default_rng(self.noise_seed).standard_normal((self.steps + 1, 3))
+    def sensing(self):
+        return sensing(self.conditions, self.steps, 3, [], self.noise_seed)
 
 
 @dataclass(frozen=True)

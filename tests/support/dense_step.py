@@ -92,10 +92,10 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
     lead = h / 2 if conditions.integrator == "midpoint" else 0.0
     t = moment.steps * h
 
-    target, target_at_end = deflections(scenario, t, h)
-    reference = filtered(scenario, moment.reference, target, target_at_end)
+    bend, bend_at_end = deflections(scenario, t, h)
+    reference = filtered(scenario, moment.reference, bend, bend_at_end)
     if scenario.inspection.filter_frequency is None:
-        asked = np.array([target, 0.0])
+        asked = np.array([bend, 0.0])
     else:
         asked = moment.reference + lead / h * (reference - moment.reference)
     torque, joint_inertia = joint_torques(robot, scenario, moment, asked, lead)
@@ -103,13 +103,10 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
     tau = conditions.thruster_time_constant
     kept = np.exp(-h / tau) if tau > 0.0 else 0.0
     mean_kept = tau / h * (1.0 - kept)  # the integral of exp(-s / tau) over the step, over h
-    thrust = command + kept * (moment.thrust - command)
-    mean_thrust = command + mean_kept * (moment.thrust - command)
-
-    angle = 2.0 * np.pi / water.period * (t + lead) + np.array(water.phase)
-    swing = np.array(water.amplitude)
-    current = water.current + swing * np.sin(angle)
-    current_rate = swing * 2.0 * np.pi / water.period * np.cos(angle)
+    target = delivered(scenario, command)
+    thrust = target + kept * (moment.thrust - target)
+    mean_thrust = target + mean_kept * (moment.thrust - target)
+    current, current_rate = water_at(scenario, t + lead)
 
     ahead = moment._replace(
         theta=moment.theta + lead * moment.theta_dot,
@@ -118,7 +115,10 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
     )
     q_ddot, link_ddot = accelerations(
         robot,
-        np.array(robot.hydrodynamic_coefficients) * water.coefficients,
+        np.outer(
+            np.multiply(robot.hydrodynamic_coefficients, water.coefficients),
+            water.link_factors or np.ones(robot.links),
+        ),
         ahead,
         np.concatenate([torque, mean_thrust]),
         current,
@@ -141,6 +141,25 @@ def advance(robot: Robot, scenario: Scenario, moment: Moment, command: Array) ->
         p_ddot=p_ddot,
         link_ddot=link_ddot,
     )
+
+
+def delivered(scenario: Scenario, command: Array) -> Array:
+    """Return the forces that thrusters come to under commands, N."""
+    gains = scenario.thruster_gains or np.ones(command.size)
+    working = np.abs(command) >= scenario.conditions.thruster_dead_band
+    return np.array(gains) * command * working
+
+
+def water_at(scenario: Scenario, t: float) -> tuple[Array, Array]:
+    """Return velocity and acceleration of the water, (2,) each."""
+    water = scenario.water
+    velocity, acceleration = np.array(water.current), np.zeros(2)
+    waves = [(wave.amplitude, wave.phase, wave.period) for wave in water.waves]
+    for amplitude, phase, period in [(water.amplitude, water.phase, water.period), *waves]:
+        swing, angle = np.array(amplitude), 2.0 * np.pi / period * t + np.array(phase)
+        velocity += swing * np.sin(angle)
+        acceleration += swing * 2.0 * np.pi / period * np.cos(angle)
+    return velocity, acceleration
 
 
 def joint_torques(
@@ -197,8 +216,8 @@ def accelerations(
 ) -> tuple[Array, Array]:
     """Return q_ddot, (n + 2,), and the accelerations of the link centres, (n, 2).
 
-    The drag is that of the moment plus its slope times lead times what the accelerations have
-    changed by since the step before.
+    Every link has coefficients of its own, (6, n). The drag is that of the moment plus its slope
+    times lead times what the accelerations have changed by since the step before.
     """
     c_t, c_n, mu, lambda_1, lambda_2, lambda_3 = coefficients
     body = oracle.links(robot, moment.theta)
@@ -255,5 +274,5 @@ class _Rows:
 
     def forces(self) -> Array:
         thrusters = len(self.robot.thrusters)
-        first = layout.first_command(self.robot.links) + thrusters
+        first = layout.thruster_row(layout.FORCE, self.robot.links, thrusters)
         return self.row[first : first + thrusters]

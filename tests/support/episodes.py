@@ -8,11 +8,22 @@ from usm_gym.evaluation import metric_names
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.robot import Robot
 from usm_gym.support.seeding import EVALUATION, stream
-from usm_gym.task.conditions import FIELD
+from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Scenario
 
 METRICS = metric_names(PlanarWorld(Robot()))
+# Harder than field in everything, with sensors that are as quick, so that no law loses the robot.
+HARDER = Conditions(
+    thruster_time_constant=0.1,
+    thruster_limit=15.0,
+    position_noise=2e-4,
+    current_limit=0.1,
+    current_variation=0.05,
+    coefficient_range=(0.6, 1.5),
+    deflection_range=(0.9, 2.1),
+    filter_range=(8.0, 14.0),
+)
 
 
 def short(count: int, duration: float = 1.0, seed: int = 0) -> list[Scenario]:

@@ -19,7 +19,7 @@ import usm_gym
 
 FILE = Path(__file__).parents[1] / "data" / "scores.json"
 # By suite, the episode of it.
-EPISODES = {"operation": 0, "operation-rough": 1, "torpedo": 2}
+EPISODES = {"operation": 0, "operation-basin": 1, "torpedo": 2}
 POLICIES = ("sta", "pd", "pid", "gsta-tuned", "lqg-joints-tuned", "mpc", "residual-ppo")
 
 

@@ -13,12 +13,16 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 from support import oracle
 from support.ball import BallScenario
+from support.episodes import HARDER
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
 
+from tests.support.laws import made_signals
 from usm_gym import Robot
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.observation import ObservationLayout
+from usm_gym.task.sampling import named
 
 Array = NDArray[np.float64]
 
@@ -33,17 +37,32 @@ def made(id: str) -> Any:
     return usm_baselines.make(id, gym.make("USM-Operation-v0"))
 
 
-def observations(steps: int, robots: int, seed: int = 0) -> NDArray[np.float32]:
-    """Return live observations of some robots that wobble about, (steps, robots, 90)."""
+def observations(
+    steps: int, robots: int, seed: int = 0, conditions: Any = HARDER
+) -> NDArray[np.float32]:
+    """Return live observations of some robots that wobble about, (steps, robots, 94)."""
     rng = np.random.default_rng(seed)
     seen = np.empty((steps, robots, LAYOUT.size), np.float32)
     for robot in range(robots):
-        env = gym.make("USM-Operation-v0", conditions="rough")
+        env = gym.make("USM-Operation-v0", conditions=conditions)
         seen[0, robot], _ = env.reset(seed=seed + robot)
         for k in range(1, steps):
             action = rng.uniform(-1.0, 1.0, 5).astype(np.float32)
             seen[k, robot] = env.step(action)[0]
     return seen
+
+
+@pytest.mark.parametrize("tier", ["basin", "sea"])
+@pytest.mark.parametrize("id", ["sta-navigator", "lqg", "lqg-joints", "mpc", "adaptive"])
+def test_with_a_navigator_the_bits_are_the_same_alone_and_in_a_batch(id: str, tier: str) -> None:
+    policy = usm_baselines.make(id, named("nominal", "operation", PRESETS[tier]).nominal)
+    seen, batch = observations(30, 3, conditions=tier), None
+    singles: list[Any] = [None] * 3
+    for now in seen:
+        actions, batch = policy.predict(now, batch)
+        for k in range(3):
+            action, singles[k] = policy.predict(now[k], singles[k])
+            np.testing.assert_array_equal(action, actions[k])
 
 
 @pytest.mark.parametrize("id", SCRIPTED)
@@ -113,7 +132,7 @@ def test_an_episode_start_forgets_its_rows_only(id: str) -> None:
 
 
 @pytest.mark.parametrize("id", SCRIPTED[:-1])
-@pytest.mark.parametrize("shape", [(89,), (91,), (0,), (2, 89), (1, 1, 90), ()])
+@pytest.mark.parametrize("shape", [(93,), (95,), (0,), (2, 93), (1, 1, 94), ()])
 def test_observations_of_a_wrong_shape_are_refused(id: str, shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="observation"):
         made(id).predict(np.zeros(shape, np.float32))
@@ -200,14 +219,13 @@ def test_laws_do_not_know_how_many_axes_there_are(id: str) -> None:
     policy = made(id)
     rng = np.random.default_rng(0)
     (y, u, velocity, acceleration), started = rng.normal(0.0, 0.1, (4, 2, 3)), np.zeros(2)
-    rest = {"allocation": np.zeros((2, 4, 3)), "observation": np.zeros((2, 90), np.float32)}
     whole, parts = np.zeros((2, 3, len(policy.state))), np.zeros((3, 2, 1, len(policy.state)))
     force, part = np.empty((2, 3)), np.empty((2, 1))
     for _ in range(3):
-        policy.control(Signals(started, y, u, velocity, acceleration, **rest), whole, force)
+        policy.control(made_signals(started, y, u, velocity, acceleration), whole, force)
         for axis, own in enumerate(parts):
             one = (each[:, [axis]].copy() for each in (y, u, velocity, acceleration))
-            policy.control(Signals(started, *one, **rest), own, part)
+            policy.control(made_signals(started, *one), own, part)
             assert np.array_equal(force[:, [axis]], part)
         started, y = np.ones(2), y + 0.01
 

@@ -39,7 +39,7 @@ def test_the_scripted_policies_are_there() -> None:
     assert {*SCRIPTED, *RIVALS} <= set(usm_baselines.ids())
     assert len(set(usm_baselines.ids())) == len(usm_baselines.ids())
     for id in usm_baselines.ids():
-        assert registry.entry(id).privileged == (id == "oracle")
+        assert registry.entry(id).privileged == (id in ("oracle", "informed"))
         assert "\n" not in registry.entry(id).summary
 
 
@@ -83,7 +83,7 @@ def test_a_registration_is_forgotten_after_its_test() -> None:
 
 def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
     usm_baselines.register("mine", Probe, "a probe")
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     env.reset(seed=0)
     policy: Any = usm_baselines.make("mine", env, k_p=3.0)
     (nominal,) = policy.args
@@ -96,17 +96,25 @@ def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
         "position_noise",
         "position_delay",
         "action_delay",
+        "position_period",
+        "velocity_period",
+        "velocity_delay",
+        "velocity_noise",
+        "tail_angle_noise",
+        "joint_angle_noise",
+        "rate_noise",
+        "thruster_dead_band",
     }
     assert nominal.robot == env.unwrapped.robot
     assert nominal.control_period == 0.02
-    assert nominal.thruster_time_constant == 0.1
-    assert nominal.position_noise == 2e-4
+    assert nominal.thruster_time_constant == 0.15
+    assert nominal.position_noise == 1e-3
 
 
 def test_nominal_knowledge_tells_no_water_from_another() -> None:
     rng = np.random.default_rng(0)
-    rough = {sample("operation", PRESETS["rough"], rng).nominal for _ in range(5)}
-    assert len(rough) == 1
+    basin = {sample("operation", PRESETS["basin"], rng).nominal for _ in range(5)}
+    assert len(basin) == 1
     wild = replace(
         named("nominal", "operation"), water=Water(current=(0.1, 0.1), coefficients=(1.5,) * 6)
     )
@@ -114,10 +122,10 @@ def test_nominal_knowledge_tells_no_water_from_another() -> None:
 
 
 def test_environments_may_be_wrapped_vectorised_or_left_out() -> None:
-    env = gym.make("USM-Operation-v0", conditions="rough")
+    env = gym.make("USM-Operation-v0", conditions="basin")
     expected = env.unwrapped.nominal
     wrapped = gym.wrappers.TimeLimit(env, 10)
-    vector = DummyVecEnv([lambda: gym.make("USM-Operation-v0", conditions="rough")] * 2)
+    vector = DummyVecEnv([lambda: gym.make("USM-Operation-v0", conditions="basin")] * 2)
     for given in (env, env.unwrapped, wrapped, vector, expected):
         made: Any = usm_baselines.make("sta", given)
         assert made.nominal == expected
@@ -148,7 +156,7 @@ def test_gains_are_taken(id: str) -> None:
     given: Any = usm_baselines.make(id, nominal, heading_gain=1, observer_gain=20.0)
     default: Any = usm_baselines.make(id, nominal)
     assert given.gains == default.gains._replace(heading_gain=1.0, observer_gain=20.0)
-    observation = np.zeros(90, np.float32)
+    observation = np.zeros(94, np.float32)
     observation[-1], observation[-7] = 1.0, 2.0  # thruster limit, heading error
     moments = [policy.predict(observation)[0][1:] for policy in (given, default)]
     np.testing.assert_allclose(moments[1], 100.0 * moments[0], rtol=1e-5)

@@ -6,7 +6,7 @@ import pytest
 from support.ball import BallScenario
 from support.episodes import short
 from support.results import PROVENANCE, evaluation, scores
-from usm_baselines.benchmark import leaderboard_figures, robustness
+from usm_baselines.benchmark import leaderboard_figures, robustness_figure
 from usm_baselines.benchmark.leaderboard import MAIN, FrontPoint, LeaderboardResult, Standing
 from usm_baselines.benchmark.leaderboard_page import brief_table, csv_text, markdown
 from usm_baselines.benchmark.results import EvaluationResult, MiddleSummary
@@ -96,7 +96,7 @@ def test_robustness_curves(axes, tmp_path, monkeypatch):
     )
     (cells,) = ([*column.cells] for column in robustness_table(result).columns[1:2])
     assert cells == [" / ".join(f"{k + 1}.00" for k in range(len(axes)))]
-    assert len(robustness.draw(result).axes) == len(axes)
+    assert len(robustness_figure.draw(result).axes) == len(axes)
     result.write("noise.json")
     main(["report", "noise.json", "--output", "page.html"])
     text = (tmp_path / "page.html").read_text()

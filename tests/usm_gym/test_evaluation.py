@@ -15,7 +15,7 @@ from support.episodes import METRICS
 
 import usm_gym
 from usm_gym import Inspection, Path, Robot, Scenario, Thruster
-from usm_gym.evaluation import Evaluation, rollout
+from usm_gym.evaluation import Evaluation, joined, rollout
 from usm_gym.task import metrics
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import sample
@@ -39,7 +39,7 @@ def short(mode: Any, preset: str, seed: int, duration: float = 6.0) -> Scenario:
 @cache
 def mixed() -> tuple[Scenario, ...]:
     """Return scenarios of several modes, lengths and timings, not in any order."""
-    operation = [short("operation", "rough", k, 6.0 + k % 3) for k in range(4)]
+    operation = [short("operation", "basin", k, 6.0 + k % 3) for k in range(4)]
     fast = replace(PRESETS["field"], physics_step=2e-3)
     fine = replace(PRESETS["field"], physics_step=5e-4, hydrodynamics="kelasidi2014")
     return (
@@ -208,10 +208,53 @@ def test_a_lost_episode_counts_as_half_a_metre_or_worse_in_both_axes() -> None:
         assert result.per_episode[name][0] < 0.1
     summary = result.summary()
     assert summary["failures"] == 1
+    assert summary["lost_share"] == pytest.approx(1 / 3)
+    assert summary["max_error_y"]["median"] == result.per_episode["max_error_y"][[0, 2]].max()
     assert summary["per_episode"]["failed"] == [False, True, False]
     assert summary["max_error_y"]["worst"] >= 0.5
     assert summary["max_error_y"]["mean"] > 0.5 / 3.0  # it enters the mean
     json.dumps(summary, allow_nan=False)
+
+
+def scan() -> Scenario:
+    """Return a short scan of five shifts."""
+    scenario = short("operation", "field", 0, 7.0)
+    motion = Inspection(times=(1.0, 2.0, 3.0, 4.0, 5.0), deflections=(0.4, -0.4, 0.4, -0.4, 0.4))
+    path = Path(speed=0.01, amplitude=0.0)
+    return replace(scenario, inspection=motion, path=path)
+
+
+def test_a_scan_has_the_errors_by_shift() -> None:
+    (trajectory,) = rollout(policy(), [scan()])
+    result = usm_gym.evaluate(policy(), [scan(), scan()])
+    assert list(result.per_episode)[: len(METRICS)] == METRICS
+    for name, start, end in (("first", 1, 2), ("third", 3, 4), ("fifth", 5, 7), ("last", 5, 7)):
+        after = [
+            error
+            for t, error in zip(trajectory.time, trajectory.error, strict=True)
+            if start - 1e-6 < t < end - 1e-6 or t == end == 7.0
+        ]
+        for k, axis in enumerate("xy"):
+            found = result.per_episode[f"{name}_shift_error_{axis}"]
+            assert found.tolist() == [max(abs(error[k]) for error in after)] * 2
+
+
+def test_of_a_lost_scan_every_shift_counts_as_half_a_metre() -> None:
+    away = replace(scan(), path=Path(speed=0.3, amplitude=0.0))
+    result = usm_gym.evaluate(Still(), [away])
+    assert result.failed.all()
+    shifts = [values for name, values in result.per_episode.items() if "_shift_error_" in name]
+    assert len(shifts) == 8
+    assert all(0.5 <= values[0] < 0.52 for values in shifts)
+
+
+def test_errors_by_shift_are_those_of_all_episodes_or_of_none() -> None:
+    fewer = replace(scan(), inspection=Inspection(times=(1.0,), deflections=(0.4,)))
+    later = replace(scan(), duration=4.5)
+    for other in (fewer, later):
+        assert list(usm_gym.evaluate(Still(), [scan(), other]).per_episode) == METRICS
+    parts = [usm_gym.evaluate(Still(), [each]) for each in (scan(), fewer)]
+    assert list(joined(parts).per_episode) == METRICS
 
 
 def test_a_loss_before_settling_is_a_loss() -> None:
@@ -319,6 +362,7 @@ def test_a_summary_is_that_of_its_episodes() -> None:
         row = summary[name]
         assert row["mean"] == pytest.approx(values.mean())
         assert row["worst"] == values.max()
+        assert np.sum(values < row["median"]) == np.sum(values > row["median"]) == 3
         low, high = row["ci95"]
         assert values.min() <= low <= row["mean"] <= high <= values.max()
         assert summary["per_episode"][name] == values.tolist()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support.strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
 
 import usm_gym
-from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water
+from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water, Wave
 from usm_gym.envs.usm import USMEnv, USMVectorEnv
 from usm_gym.robots import robot_of
 from usm_gym.support.validation import QUOTED, SAID
@@ -21,7 +21,7 @@ from usm_gym.task.scenario import MODES
 AFFORDABLE = 300_000
 ROBOT = Robot()
 NOMINAL = Scenario().nominal
-CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Scenario]
+CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Wave, Scenario]
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -54,9 +54,11 @@ def test_suites_of_several_robots_are_scored_in_one_evaluation(small):
     drawn = [sample("torpedo", PRESETS["ideal"], draw, robot) for robot in (small, "paper") * 2]
     scenarios = [replace(scenario, duration=3.0, settle_time=1.0) for scenario in drawn]
 
+    fleets = (Robot(), 5), (SMALL, 3)
+
     class Still:
         def predict(self, observation, state=None, episode_start=None, deterministic=True):
-            thrusters = {90: 5, usm_gym.world.world_of(SMALL).layout.size: 3}
+            thrusters = {usm_gym.world.world_of(robot).layout.size: n for robot, n in fleets}
             return np.zeros((len(observation), thrusters[observation.shape[1]])), None
 
     robots._robots.pop(small)  # as in another process, which knows no such name
@@ -79,9 +81,9 @@ def test_an_environment_has_the_robot_of_its_scenarios(small):
 
 def test_robots_that_share_no_nominal_knowledge_make_no_policy():
     envs = gym.make_vec("USM-Operation-v0", num_envs=2, vectorization_mode="vector_entry_point")
-    rough = replace(PRESETS["field"], position_noise=1e-3)
+    louder = replace(PRESETS["field"], position_noise=1e-3)
     scenario = usm_gym.suite("operation")[0]
-    envs.reset(options={"scenario": [scenario, scenario.under(rough)]})
+    envs.reset(options={"scenario": [scenario, scenario.under(louder)]})
     with pytest.raises(ValueError, match="scenarios is '2 kinds'; allowed: one nominal knowledge"):
         usm_baselines.make("sta", envs)
 

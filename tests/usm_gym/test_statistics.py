@@ -55,6 +55,21 @@ def test_with_one_seed_it_is_the_ordinary_bootstrap() -> None:
         assert found == pytest.approx((low, high), abs=0.03 * (high - low))
 
 
+def test_indices_are_drawn_in_parts_to_the_bits_of_one_draw() -> None:
+    rng = np.random.default_rng(8)
+    one, other = rng.exponential(size=(3, 11)), rng.exponential(size=(5, 11))
+    source = np.random.default_rng(0)
+    ours, theirs, episodes = (
+        source.integers(size, size=(statistics.RESAMPLES, size)) for size in (3, 5, 11)
+    )
+    means = [
+        table[seeds[:, :, None], episodes[:, None, :]].reshape(len(seeds), -1).mean(axis=1)
+        for table, seeds in ((one, ours), (other, theirs))
+    ]
+    low, high = np.quantile(means[0] / means[1], (0.025, 0.975))
+    assert ratio_interval(one, other) == (low, high)
+
+
 def test_equal_seeds_add_nothing() -> None:
     values = np.random.default_rng(7).exponential(size=60)
     low, high = interval(np.mean, values)

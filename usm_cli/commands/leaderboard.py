@@ -7,7 +7,7 @@ from importlib.metadata import version
 from typing import Any
 
 from rich.markdown import Markdown
-from usm_baselines.benchmark.leaderboard import MAIN, everyone, front, leaderboard, places, suites
+from usm_baselines.benchmark.leaderboard import MAIN, front, leaderboard, places, suites
 from usm_baselines.benchmark.leaderboard_page import csv_text, markdown, table, with_table
 
 from usm_cli.options import output_folder
@@ -15,8 +15,8 @@ from usm_cli.selection import (
     POLICIES,
     add_policies,
     add_scoring,
-    chosen_contenders,
     leave_if_refused,
+    named_contenders,
     scored,
 )
 from usm_cli.terminal import output_console
@@ -27,10 +27,12 @@ from usm_gym.support.results import Provenance
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
-Score every policy on every frozen suite, and on the operation suite with the joints still. Writes
-leaderboard.json, leaderboard.csv, leaderboard.md and three figures (extra `render`) into a folder.
-After an interruption, run it again to continue: the folder `cache` there keeps the scores of a
-policy on a suite until something changes on which they depend.
+Score every policy on the frozen suites that it is meant for, and on the operation suite with the
+joints still: policies that are tuned for `basin` or `sea` on the suites of these conditions only,
+and there no others but the paper's `sta` and `pd` and those that are no competitors. Policies that
+are named meet every suite. Writes leaderboard.json, leaderboard.csv, leaderboard.md and three
+figures (extra `render`) into a folder. After an interruption, run it again to continue: the folder
+`cache` there keeps the scores of a policy on a suite until something changes on which they depend.
 """
 EXAMPLES = f"""\
 {POLICIES}
@@ -38,6 +40,8 @@ examples:
   usm leaderboard --workers 2                          into results/VERSION
   usm leaderboard --insert README.md                   also a short table between its marks
   usm leaderboard --policies sta,my_module:MyController --output mine
+  usm leaderboard --policies lqg-tuned,lqg-basin,lqg-sea --output tiers
+                                                       a cross-table of gains and conditions, too
 """
 
 
@@ -49,7 +53,7 @@ def add_to(subparsers: Any) -> None:
         description=DESCRIPTION,
         epilog=EXAMPLES,
     )
-    add_policies(parser, default="all, also those that are no competitors")
+    add_policies(parser, default="all on the suites that they are meant for")
     add_scoring(parser)
     add = parser.add_argument
     add("--output", metavar="DIR", help="folder (default: results/VERSION)")
@@ -70,7 +74,7 @@ def run(arguments: argparse.Namespace) -> None:
     from usm_baselines.benchmark.leaderboard_figures import draw_all
 
     named = arguments.policies is not None
-    contenders = chosen_contenders(arguments.policies) if named else everyone()
+    contenders = named_contenders(arguments.policies) if named else None
     fronts = {} if named else front()
     chosen = places(contenders, fronts, suites(), arguments.time_limit)
     with holding(folder):

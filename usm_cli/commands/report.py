@@ -10,7 +10,7 @@ from typing import Any
 from rich.progress import Progress, TaskID
 
 from usm_cli.options import add_computing, check_installed, computing, count
-from usm_cli.selection import POLICIES, chosen_contenders
+from usm_cli.selection import POLICIES, named_contenders
 from usm_cli.terminal import output_console, progress_bar
 from usm_gym.support.files import check_writable, write_text
 from usm_gym.support.provenance import provenance
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> None:
 
     path = Path(arguments.output)
     check_writable(path)
-    contenders = None if arguments.policies is None else chosen_contenders(arguments.policies)
+    contenders = None if arguments.policies is None else named_contenders(arguments.policies)
     scenario = count(arguments, "scenario", 0, least=0)
     files = [Path(name) for name in arguments.results]
     results = {file: read(file) for file in files}  # before any computation

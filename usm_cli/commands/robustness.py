@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from math import isfinite
 from typing import Any
 
 from rich.table import Table
-from usm_baselines.benchmark import robustness
+from usm_baselines.benchmark import robustness, robustness_figure
 from usm_baselines.benchmark.robustness import (
     QUANTITIES,
     RefusedPoint,
@@ -29,14 +30,16 @@ from usm_cli.selection import (
 )
 from usm_cli.terminal import empty_table, output_console
 from usm_gym.support.results import Provenance
-from usm_gym.support.text import mm
+from usm_gym.support.text import degrees, mm
 from usm_gym.support.validation import require
 
 DESCRIPTION = """\
 Vary one quantity of a suite, with all else equal, and score policies at every value. The policies
-keep the nominal knowledge of the suite; they always know the true control period. Writes
-QUANTITY.json and QUANTITY.png (extra `render`) into a folder. After an interruption, run it again
-to continue.
+keep the nominal knowledge of the suite; they always know the true control period. What is counted
+in control periods changes with that. The table has the mean of the largest errors and of the
+largest heading error, and how many robots are lost; the figure has the errors of the robots that
+are not lost, and the share of those that are. Writes QUANTITY.json and QUANTITY.png (extra
+`render`) into a folder. After an interruption, run it again to continue.
 """
 EXAMPLES = f"""\
 quantities:
@@ -45,6 +48,7 @@ quantities:
 examples:
   usm robustness --vary noise --policies sta,pd
   usm robustness --vary limit --values 2,4,8,16 --policies sta
+  usm robustness --vary fix-delay --conditions basin    about the suite operation-basin
 """
 
 
@@ -71,7 +75,7 @@ def run(arguments: argparse.Namespace) -> None:
     quantity = QUANTITIES[arguments.vary]
     values = quantity.values if arguments.values is None else parse_values(arguments.values)
     scenarios = chosen_scenarios(arguments)
-    contenders = chosen_contenders(arguments.policies)
+    contenders = chosen_contenders(arguments.policies, scenarios[0].conditions)
     jobs(contenders, scenarios, arguments.time_limit)  # refuses policies that cannot be made
     chosen = robustness.jobs(contenders, scenarios, quantity, values, arguments.time_limit)
     folder = output_folder(arguments.output)
@@ -85,7 +89,7 @@ def run(arguments: argparse.Namespace) -> None:
         provenance=Provenance.here(seeds(arguments)),
     )
     result.write(folder / f"{arguments.vary}.json")
-    figure = robustness.draw(result)
+    figure = robustness_figure.draw(result)
     figure.savefig(folder / f"{arguments.vary}.png", dpi=120, metadata={"Software": None})
     output_console().print(table(result))
     leave_if_refused(result.refused)
@@ -97,17 +101,19 @@ def parse_values(text: str) -> tuple[float, ...]:
         values = tuple(map(float, text.split(",")))
     except ValueError:
         values = ()
-    require(values, "--values", text, "numbers, separated by commas")
+    known = bool(values) and all(map(isfinite, values))
+    require(known, "--values", text, "numbers, separated by commas")
     return values
 
 
 def table(result: RobustnessResult) -> Table:
-    """Mean errors in mm, one row per policy."""
+    """Mean errors in mm and degrees and the number of lost robots, one row per policy."""
     axes = " / ".join(result.axes)
     rows = empty_table(
         "policy",
         *(f"{value:g}" for value in result.values),
-        title=f"largest position error after settling, mm, {axes}, against {result.label}",
+        title=f"largest position error after settling, mm, {axes}, then that of the heading, and "
+        f"lost robots, against {result.label}",
     )
     for name, points in result.results.items():
         rows.add_row(name, *map(cell, points))
@@ -115,7 +121,10 @@ def table(result: RobustnessResult) -> Table:
 
 
 def cell(point: ScoredPoint | RefusedPoint) -> str:
-    """Write the errors at one value."""
+    """Write the errors and losses at one value, the latter in a line of their own."""
     if isinstance(point, RefusedPoint):
         return "refused"
-    return " / ".join(mm(error.mean) for error in point.errors.values())
+    errors = " / ".join(mm(error.mean) for error in point.errors.values())
+    besides = [f"{degrees(error.mean)}°" for error in point.attitude.values()]
+    besides += [f"{point.failures} lost"] * (point.failures > 0)
+    return "\n".join([errors, *([", ".join(besides)] if besides else [])])

@@ -9,6 +9,7 @@ from typing import Any
 from usm_cli.options import check_installed, parse_conditions
 from usm_cli.terminal import output_console, progress_bar
 from usm_gym.support.validation import require
+from usm_gym.task.conditions import PRESETS
 
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
@@ -58,7 +59,7 @@ def add_to(subparsers: Any) -> None:
     for name, kind, metavar, text in OPTIONS:
         add(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
     add("--omit", metavar="A,B", help="entries of the observation to hide from the agent")
-    add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
+    add("--conditions", metavar="C", help=f"{', '.join(PRESETS)}, or JSON (default: field)")
     add("--output", metavar="DIR", required=True, help="folder of the training and of its agent")
     add(
         "--resume",

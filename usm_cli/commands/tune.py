@@ -14,7 +14,7 @@ from usm_cli.terminal import output_console, progress_bar
 from usm_gym.support.files import check_writable, holding, write_json
 from usm_gym.support.provenance import provenance
 from usm_gym.support.text import figures
-from usm_gym.task.conditions import FIELD
+from usm_gym.task.conditions import FIELD, PRESETS
 from usm_gym.task.metrics import VARIATION_WEIGHT
 from usm_gym.task.scenario import MODES
 
@@ -31,6 +31,7 @@ examples:
   usm tune sta                                      writes sta.json, trials in sta.db
   usm tune sta --trials 50 --workers 2              a quick look
   usm tune sta --weight 0.01 --output calm.json     less chattering, more error
+  usm tune lqg --conditions basin                   gains for other conditions
   usm evaluate --policies sta,sta@sta.json          score the new gains
 """
 
@@ -49,7 +50,7 @@ def add_to(subparsers: Any) -> None:
     add("--episodes", type=int, metavar="N", help="scenarios per set (default: 50)")
     add("--weight", type=float, metavar="W", help="mm per N/s of variation (default: 0.002)")
     add("--mode", choices=MODES, default="operation", help="default: operation")
-    add("--conditions", metavar="C", help="ideal, field, rough, or JSON (default: field)")
+    add("--conditions", metavar="C", help=f"{', '.join(PRESETS)}, or JSON (default: field)")
     add("--seed", type=int, metavar="S", help="seed of scenarios and search (default: 0)")
     add("--output", metavar="FILE", help="file of gains and provenance (default: POLICY.json)")
     add("--storage", metavar="URL", help="Optuna's storage (default: SQLite, beside the output)")

@@ -13,8 +13,8 @@ from usm_cli.selection import (
     POLICIES,
     add_policies,
     add_scenarios,
-    chosen_contenders,
     chosen_scenario,
+    named_contenders,
 )
 from usm_cli.take import instants, take
 from usm_cli.terminal import empty_table, output_console, progress_bar
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> None:
         check_writable(path)
     else:
         require(has_display(), "--output", None, "a file .mp4 or .gif, since there is no display")
-    contenders = chosen_contenders(arguments.policies or "sta")
+    contenders = named_contenders(arguments.policies or "sta")
     require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
     scenario = chosen_scenario(arguments)
     fps = film.FPS[medium]

@@ -66,9 +66,9 @@ class USMEnv(TrackingEnv):
 
     ## End
 
-    Truncation at the scenario's duration (40 s, 2000 steps). Termination when the robot is lost:
-    the true error exceeds 0.5 m in an axis, or the state is no longer finite; the observation is
-    finite all the same.
+    Truncation at the scenario's duration (40 s, 2000 steps; in "basin" and "sea" 60 s, 3000
+    steps). Termination when the robot is lost: the true error exceeds 0.5 m in an axis, or the
+    state is no longer finite; the observation is finite all the same.
 
     ## Info, at every step
 
@@ -86,15 +86,15 @@ class USMEnv(TrackingEnv):
 
     | argument | default | meaning |
     |---|---|---|
-    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"rough"`, or a dict of `Conditions` fields |
+    | `conditions` | `"field"` | `"ideal"`, `"field"`, `"basin"`, `"sea"`, or a dict of fields |
     | `robot` | the paper's | a dict of `Robot` fields |
     | `render_mode` | None | `"rgb_array"`: `render()` gives an image of 640 x 480; `"human"`: a \
 window shows every step in real time (drawing needs the extra `render`) |
 
     ## Version history
 
-    - v0: first version; since 0.2.0 the heading is part of the reward, and the physics step of
-      second order.
+    - v0: first version; since 0.2.0 the heading is part of the reward, the physics step is of
+      second order, and the observation has a measured velocity and the ages of measurements.
     """
 
     # One frame per control period; an instance corrects the rate if it has another period.

@@ -39,7 +39,7 @@ class Plant(NamedTuple):
         h: Physics step, s.
         substeps: Physics steps in a control period.
         shifts: Largest number of changes of the joint references in any episode.
-        moving_water: Whether the water's velocity changes in any episode.
+        sinusoids: Largest number of sinusoids in the water's velocity in any episode.
     """
 
     l: float
@@ -54,7 +54,7 @@ class Plant(NamedTuple):
     h: float
     substeps: int
     shifts: int
-    moving_water: bool
+    sinusoids: int
 
 
 @piece
@@ -150,7 +150,7 @@ def own_answers(block, like, wide, stride, links, base, plant):
     """
     rows = padded(links)
     own = row_of(OWN, links)
-    coefficients = (
+    common = (
         load(block, C_T, like),
         load(block, C_N, like),
         load(block, MU, like),
@@ -168,6 +168,15 @@ def own_answers(block, like, wide, stride, links, base, plant):
         v_t = c * u_x + s * u_y
         v_n = c * u_y - s * u_x
         water_t = c * water_x + s * water_y
+        factor = load(block, row_of(FACTOR, links) + i, wide)
+        coefficients = (
+            factor * common[0],
+            factor * common[1],
+            factor * common[2],
+            factor * common[3],
+            factor * common[4],
+            factor * common[5],
+        )
         f_t, f_n, moment = fluid_force(
             v_t, v_n, omega, water_t, coefficients, plant.kirchhoff, plant.linear_drag
         )

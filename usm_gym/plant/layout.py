@@ -19,41 +19,50 @@ from usm_gym.kernels.lanes import WIDTH
 
 # Physics steps since the start, as a float. Position, velocity, acceleration of the centre of mass.
 CLOCK, P_X, P_Y, V_X, V_Y, A_X, A_Y = range(7)
-# True hydrodynamic coefficients of a link, as in `Robot.hydrodynamic_coefficients`.
+# True hydrodynamic coefficients common to the links, as in `Robot.hydrodynamic_coefficients`.
 C_T, C_N, MU, LAMBDA_1, LAMBDA_2, LAMBDA_3 = range(7, 13)
-# Velocity and acceleration of the water now, and what they are made of:
-# mean + amplitude * sin(frequency * t + phase) in each axis.
-WATER_X, WATER_Y, WATER_AX, WATER_AY = range(13, 17)
-MEAN_X, MEAN_Y, AMPLITUDE_X, AMPLITUDE_Y, PHASE_X, PHASE_Y, WATER_FREQUENCY = range(17, 24)
+# Velocity and acceleration of the water now, and what they are made of: in each axis a mean and a
+# number of sinusoids, amplitude * sin(frequency * t + phase), a slow current and then the waves.
+WATER_X, WATER_Y, WATER_AX, WATER_AY, MEAN_X, MEAN_Y = range(13, 19)
+MAX_SINUSOIDS = 5
+SINUSOID = 19
+AMPLITUDE_X, AMPLITUDE_Y, PHASE_X, PHASE_Y, FREQUENCY_OF_WATER = range(5)
+SINUSOID_ROWS = 5
 # Joint controllers: gains, and the joint-space inertia that their implicit treatment adds.
-STIFFNESS, DAMPING, JOINT_INERTIA = range(24, 27)
+_JOINTS = SINUSOID + MAX_SINUSOIDS * SINUSOID_ROWS
+STIFFNESS, DAMPING, JOINT_INERTIA = range(_JOINTS, _JOINTS + 3)
 # Joint references: the deflection that the bending joints share, its rate and acceleration; the
 # filter over one physics step (deflection and rate, from either) and what gives the acceleration.
-DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(27, 30)
-FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR, FILTER_STIFFNESS, FILTER_DAMPING = range(30, 36)
-# Thrusters: share of the way to the command that a physics step covers by its end and in its mean,
-# and the limit.
-LAG, MEAN_LAG, LIMIT = range(36, 39)
+_REFERENCES = _JOINTS + 3
+DEFLECTION, DEFLECTION_RATE, DEFLECTION_ACCELERATION = range(_REFERENCES, _REFERENCES + 3)
+_FILTER = _REFERENCES + 3
+FILTER_DD, FILTER_DR, FILTER_RD, FILTER_RR = range(_FILTER, _FILTER + 4)
+FILTER_STIFFNESS, FILTER_DAMPING = range(_FILTER + 4, _FILTER + 6)
+# Thrusters: share of the way to its target that a physics step covers by its end and in its mean,
+# the limit, and the smallest force that they make.
+_THRUSTERS = _FILTER + 6
+LAG, MEAN_LAG, LIMIT, DEAD_BAND = range(_THRUSTERS, _THRUSTERS + 4)
 # When the deflection changes, in physics steps since the start (`NEVER` where it does not), and by
 # how much.
 NEVER = 1e30
-MAX_SHIFTS = 8
-SHIFT_STEP = 39
+MAX_SHIFTS = 16
+SHIFT_STEP = _THRUSTERS + 4
 SHIFT_SIZE = SHIFT_STEP + MAX_SHIFTS
 HEADER = SHIFT_SIZE + MAX_SHIFTS
 
 # Quantities of the links. State: angle and rate. Fixed in an episode: the share of the deflection
-# that is the reference of the joint to the next link, and on which side of the root the link is
-# (1.0 tail, 0.0 the root itself, -1.0 head). Thrust along and across.
-THETA, OMEGA, SHARE, SIDE, PUSH_T, PUSH_N = range(6)
+# that is the reference of the joint to the next link, on which side of the root the link is
+# (1.0 tail, 0.0 the root itself, -1.0 head), and its hydrodynamic coefficients over the common
+# ones. Thrust along and across.
+THETA, OMEGA, SHARE, SIDE, FACTOR, PUSH_T, PUSH_N = range(7)
 # Where forces are taken: sine and cosine of the angle, its rate, velocity of the centre, torque of
 # the joint to the next link.
-SIN, COS, RATE, U_X, U_Y, TORQUE = range(6, 12)
+SIN, COS, RATE, U_X, U_Y, TORQUE = range(7, 13)
 # Angular acceleration, and acceleration of the centre relative to the water; those of the step
 # before until `accelerate` has found those of this one.
-ALPHA, LINK_AX, LINK_AY = range(12, 15)
+ALPHA, LINK_AX, LINK_AY = range(13, 16)
 # The link's own answer, see `chain`; once it is eliminated, its back substitution.
-OWN = 15
+OWN = 16
 SUB_0, SUB_G, SUB_X, SUB_Y = range(OWN, OWN + 4)
 QUANTITIES = OWN + 9
 
@@ -70,10 +79,15 @@ def row_of(quantity: int, links: int) -> int:
     return HEADER + quantity * padded(links)
 
 
+# Quantities of the thrusters: command, force, gain, and the force that the command leads to.
+COMMAND, FORCE, GAIN, TARGET = range(4)
+THRUSTER_QUANTITIES = 4
+
+
 @shared
-def first_command(links: int) -> int:
-    """Row of the first thruster's command; the thrusters' forces follow the commands."""
-    return row_of(QUANTITIES, links)
+def thruster_row(quantity: int, links: int, thrusters: int) -> int:
+    """Row of a quantity of the first thruster."""
+    return row_of(QUANTITIES, links) + quantity * thrusters
 
 
 def sides(links: int) -> NDArray[np.float64]:
@@ -84,4 +98,4 @@ def sides(links: int) -> NDArray[np.float64]:
 @shared
 def body_rows(links: int, thrusters: int) -> int:
     """Rows of a robot of `links` links and `thrusters` thrusters; a world adds its own."""
-    return first_command(links) + 2 * thrusters
+    return thruster_row(THRUSTER_QUANTITIES, links, thrusters)

@@ -19,16 +19,18 @@ from usm_gym.plant.thrusters import push
 @piece
 def move_water(block, like, plant):
     """Velocity and acceleration of the water where forces are taken."""
-    frequency = load(block, WATER_FREQUENCY, like)
-    angle = frequency * (load(block, CLOCK, like) * plant.h + plant.lead)
-    s, c = sincos(angle + load(block, PHASE_X, like))
-    amplitude = load(block, AMPLITUDE_X, like)
-    store(block, WATER_X, load(block, MEAN_X, like) + amplitude * s)
-    store(block, WATER_AX, amplitude * (frequency * c))
-    s, c = sincos(angle + load(block, PHASE_Y, like))
-    amplitude = load(block, AMPLITUDE_Y, like)
-    store(block, WATER_Y, load(block, MEAN_Y, like) + amplitude * s)
-    store(block, WATER_AY, amplitude * (frequency * c))
+    time = load(block, CLOCK, like) * plant.h + plant.lead
+    for axis in range(2):
+        velocity, acceleration = load(block, MEAN_X + axis, like), like
+        for k in range(plant.sinusoids):
+            row = SINUSOID + k * SINUSOID_ROWS
+            frequency = load(block, row + FREQUENCY_OF_WATER, like)
+            amplitude = load(block, row + AMPLITUDE_X + axis, like)
+            s, c = sincos(frequency * time + load(block, row + PHASE_X + axis, like))
+            velocity += amplitude * s
+            acceleration += amplitude * (frequency * c)
+        store(block, WATER_X + axis, velocity)
+        store(block, WATER_AX + axis, acceleration)
 
 
 @piece
@@ -63,7 +65,7 @@ def physics_step(block, like, wide, stride, plant, base):
 def advance(block, like, wide, stride, plant):
     """Advance one block by a control period; `like`, `wide` and `stride` as in `chain`."""
     for _ in range(plant.substeps):
-        if plant.moving_water:
+        if plant.sinusoids > 0:
             move_water(block, like, plant)
         base = kinematics(block, like, wide, stride, plant)
         physics_step(block, like, wide, stride, plant, base)

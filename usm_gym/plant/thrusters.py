@@ -33,6 +33,12 @@ def saturated(value, limit):
 
 
 @piece
+def delivered(command, gain, dead_band):
+    """The force that a command leads to, N: none below the smallest force that thrusters make."""
+    return gain * command if abs(command) >= dead_band else 0.0
+
+
+@piece
 def command(row, lanes, lane, links, action):
     """Set the thruster commands of one robot from its action in [-1, 1]; beyond it saturates.
 
@@ -41,12 +47,17 @@ def command(row, lanes, lane, links, action):
     Returns:
         The mean absolute command, N.
     """
-    limit = row[LIMIT * lanes + lane]
+    limit, dead_band = row[LIMIT * lanes + lane], row[DEAD_BAND * lanes + lane]
+    commands = thruster_row(COMMAND, links, action.size)
+    gains = thruster_row(GAIN, links, action.size)
+    targets = thruster_row(TARGET, links, action.size)
     effort = 0.0
     for j in range(action.size):
-        share = saturated(float(action[j]), 1.0)
-        row[(first_command(links) + j) * lanes + lane] = share * limit
-        effort += abs(share * limit)
+        force = saturated(float(action[j]), 1.0) * limit
+        gain = row[(gains + j) * lanes + lane]
+        row[(commands + j) * lanes + lane] = force
+        row[(targets + j) * lanes + lane] = delivered(force, gain, dead_band)
+        effort += abs(force)
     return effort / action.size
 
 
@@ -59,11 +70,11 @@ def push(block, like, plant):
         store(block, along + plant.thruster_links[j], like)
         store(block, across + plant.thruster_links[j], like)
     lag, mean_lag = load(block, LAG, like), load(block, MEAN_LAG, like)
-    commands = first_command(links)
-    forces = commands + thrusters
+    forces = thruster_row(FORCE, links, thrusters)
+    targets = thruster_row(TARGET, links, thrusters)
     for j in range(thrusters):
         force = load(block, forces + j, like)
-        way = load(block, commands + j, like) - force
+        way = load(block, targets + j, like) - force
         store(block, forces + j, force + lag * way)
         target = plant.thruster_links[j] + (across if plant.thruster_is_normal[j] else along)
         store(block, target, load(block, target, like) + (force + mean_lag * way))

@@ -16,7 +16,15 @@ from usm_gym.task.conditions import Conditions
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
-NAMES = ("operation", "operation-ideal", "operation-rough", "torpedo", "table1")
+NAMES = (
+    "operation",
+    "operation-ideal",
+    "operation-basin",
+    "operation-sea",
+    "torpedo",
+    "torpedo-sea",
+    "table1",
+)
 
 
 def suite(name: str) -> list[Scenario]:

@@ -15,11 +15,14 @@ from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import MODES, Mode, Scenario
 
 SEED = 20261122
-RECIPES: dict[str, tuple[Mode, str, int]] = {
-    "operation": ("operation", "field", 50),
-    "operation-ideal": ("operation", "ideal", 20),
-    "operation-rough": ("operation", "rough", 50),
-    "torpedo": ("torpedo", "field", 50),
+# Mode, conditions, number of scenarios, and the key of their streams; 2 has been a suite's before.
+RECIPES: dict[str, tuple[Mode, str, int, int]] = {
+    "operation": ("operation", "field", 50, 0),
+    "operation-ideal": ("operation", "ideal", 20, 1),
+    "operation-basin": ("operation", "basin", 50, 4),
+    "operation-sea": ("operation", "sea", 50, 5),
+    "torpedo": ("torpedo", "field", 50, 3),
+    "torpedo-sea": ("torpedo", "sea", 50, 6),
 }
 
 
@@ -27,8 +30,7 @@ def scenarios(name: str) -> list[Scenario]:
     """Draw the scenarios of a suite."""
     if name == "table1":
         return [named("table1", mode) for mode in MODES]
-    mode, conditions, count = RECIPES[name]
-    key = NAMES.index(name)
+    mode, conditions, count, key = RECIPES[name]
     return [sample(mode, PRESETS[conditions], stream(SEED, SUITE, key, i)) for i in range(count)]
 
 

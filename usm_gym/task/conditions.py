@@ -17,11 +17,15 @@ LARGEST_CURRENT = 5.0
 MOST_SUBSTEPS = 10_000
 
 # Beyond these nothing is worth simulating: control periods, and s.
-LARGEST_DELAY, LARGEST_TIME_CONSTANT = 100, 100.0
+LARGEST_DELAY, LARGEST_PERIOD, LARGEST_TIME_CONSTANT = 100, 1000, 100.0
 
 Coefficient = Annotated[Number, Field(ge=0.01, le=100)]
 Deflection = Annotated[Number, Field(ge=1e-3, le=20)]
 Delay = Annotated[int, Strict(), Field(ge=0, le=LARGEST_DELAY)]
+Every = Annotated[int, Strict(), Field(ge=1, le=LARGEST_PERIOD)]
+Noise = Annotated[Number, Field(ge=0, le=1)]
+# A scan has room for so many shifts up to its end, and metrics leave 3 s after each out.
+Gap = Annotated[Number, Field(ge=4, le=30)]
 FilterFrequency = Annotated[Number, Field(ge=0.01, le=1000)]
 
 
@@ -41,15 +45,31 @@ class Conditions:
         drag: "linear and quadratic", as published, or "quadratic" alone, ibidem. No control law is
             told.
         thruster_time_constant: First-order lag of the thrusters, 0 (none) to 100 s.
-        thruster_limit: Largest force of a thruster, 0.01 to 1000 N.
-        position_noise: Standard deviation of the position measurement, per axis, 0 to 1 m.
-        position_delay: By how many control periods the measured position is late, 0 to 100.
+        thruster_limit: Largest command of a thruster, 0.01 to 1000 N.
+        thruster_dead_band: Commands below this make no force, 0 to 1000 N.
+        thruster_gain_range: Force of a thruster over its command, drawn for each, 0.01 to 100.
         action_delay: After how many control periods a command takes effect, 0 to 100.
+        position_noise: Standard deviation of the position measurement, per axis, 0 to 1 m.
+        position_period: Control periods between measurements of the position, 1 to 1000.
+        position_delay: By how many control periods a measured position is late, 0 to 100.
+        position_missing: Share of the positions that never arrive, 0 to 0.99.
+        velocity_period: Control periods between measurements of the velocity over ground, 1 to
+            1000; None: nothing measures it.
+        velocity_delay: By how many control periods a measured velocity is late, 0 to 100.
+        velocity_noise: Standard deviation of the velocity measurement, per axis, 0 to 1 m/s.
+        tail_angle_noise: Standard deviation of the measured angle of the tail, 0 to 1 rad.
+        joint_angle_noise: The same of the joint angles, 0 to 1 rad.
+        rate_noise: The same of the rates of the tail and of the joints, 0 to 1 rad/s.
         current_limit: Largest constant current per axis, 0 to 5 m/s.
-        current_variation: Largest amplitude of a sinusoidal current on top of it, 0 to 5 m/s.
+        current_variation: Largest amplitude of a slow sinusoidal current on top of it, 0 to 5 m/s.
+        wave_limit: Largest speed of the water in waves, on top of the current, 0 to 5 m/s.
         coefficient_range: True hydrodynamic coefficients over the nominal ones, 0.01 to 100.
+        coefficient_spread: Largest deviation of a link's coefficients from those common to all, as
+            a share of them, 0 to 0.99.
         deflection_range: Size of the head deflections, 0.001 to 20 rad.
         filter_range: Natural frequency of the joint references' filter, 0.01 to 1000 rad/s.
+        shift_gap_range: Time between shifts of a scan, 4 to 30 s; None: three shifts in 40 s. A
+            scan lasts 60 s, of which the first 20 do not count, in either mode.
         motion: False keeps the joints still.
     """
 
@@ -60,14 +80,27 @@ class Conditions:
     drag: Drag = "linear and quadratic"
     thruster_time_constant: Annotated[Number, Field(ge=0, le=LARGEST_TIME_CONSTANT)] = 0.05
     thruster_limit: Annotated[Number, Field(ge=0.01, le=1000)] = 20.0
-    position_noise: Annotated[Number, Field(ge=0, le=1)] = 5e-5
-    position_delay: Delay = 0
+    thruster_dead_band: Annotated[Number, Field(ge=0, le=1000)] = 0.0
+    thruster_gain_range: tuple[Coefficient, Coefficient] = (1.0, 1.0)
     action_delay: Delay = 0
+    position_noise: Noise = 5e-5
+    position_period: Every = 1
+    position_delay: Delay = 0
+    position_missing: Annotated[Number, Field(ge=0, le=0.99)] = 0.0
+    velocity_period: Every | None = None
+    velocity_delay: Delay = 0
+    velocity_noise: Noise = 0.0
+    tail_angle_noise: Noise = 0.0
+    joint_angle_noise: Noise = 0.0
+    rate_noise: Noise = 0.0
     current_limit: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.05
     current_variation: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.0
+    wave_limit: Annotated[Number, Field(ge=0, le=LARGEST_CURRENT)] = 0.0
     coefficient_range: tuple[Coefficient, Coefficient] = (0.8, 1.2)
+    coefficient_spread: Annotated[Number, Field(ge=0, le=0.99)] = 0.0
     deflection_range: tuple[Deflection, Deflection] = (0.7, 1.75)
     filter_range: tuple[FilterFrequency, FilterFrequency] = (6.0, 12.0)
+    shift_gap_range: tuple[Gap, Gap] | None = None
     motion: Switch = True
 
     def __post_init__(self) -> None:
@@ -80,9 +113,12 @@ class Conditions:
             self.control_period,
             f"1 to {MOST_SUBSTEPS} times physics_step = {self.physics_step}",
         )
-        for name in ("coefficient_range", "deflection_range", "filter_range"):
-            low, high = getattr(self, name)
+        for name in RANGES:
+            low, high = getattr(self, name) or (0.0, 0.0)
             require(low <= high, name, (low, high), "low <= high")
+        allowed = f"up to thruster_limit = {self.thruster_limit}"
+        reachable = self.thruster_dead_band <= self.thruster_limit
+        require(reachable, "thruster_dead_band", self.thruster_dead_band, allowed)
 
     @property
     def timing(self) -> tuple[float, float, str, str, str]:
@@ -96,6 +132,15 @@ class Conditions:
         return round(self.control_period / self.physics_step)
 
 
+# Fields that are ranges from which something is drawn.
+RANGES = (
+    "thruster_gain_range",
+    "coefficient_range",
+    "deflection_range",
+    "filter_range",
+    "shift_gap_range",
+)
+
 FIELD = Conditions()
 PRESETS: dict[str, Conditions] = {
     "ideal": Conditions(
@@ -106,15 +151,47 @@ PRESETS: dict[str, Conditions] = {
         coefficient_range=(1.0, 1.0),
     ),
     "field": FIELD,
-    "rough": Conditions(
-        thruster_time_constant=0.1,
-        thruster_limit=15.0,
-        position_noise=2e-4,
-        current_limit=0.1,
+    "basin": Conditions(
+        thruster_time_constant=0.15,
+        thruster_limit=8.0,
+        thruster_dead_band=0.3,
+        thruster_gain_range=(0.85, 1.15),
+        position_noise=1e-3,
+        position_period=5,
+        position_delay=3,
+        position_missing=0.02,
+        tail_angle_noise=2e-3,
+        joint_angle_noise=1e-3,
+        rate_noise=2e-3,
+        current_limit=0.03,
+        current_variation=0.02,
+        coefficient_range=(0.7, 1.4),
+        coefficient_spread=0.15,
+        filter_range=(4.0, 8.0),
+        shift_gap_range=(4.0, 6.0),
+    ),
+    "sea": Conditions(
+        thruster_time_constant=0.2,
+        thruster_limit=20.0,
+        thruster_dead_band=0.3,
+        thruster_gain_range=(0.8, 1.2),
+        position_noise=0.03,
+        position_period=50,
+        position_delay=15,
+        position_missing=0.05,
+        velocity_period=10,
+        velocity_delay=5,
+        velocity_noise=5e-3,
+        tail_angle_noise=2e-3,
+        joint_angle_noise=1e-3,
+        rate_noise=2e-3,
+        current_limit=0.15,
         current_variation=0.05,
-        coefficient_range=(0.6, 1.5),
-        deflection_range=(0.9, 2.1),
-        filter_range=(8.0, 14.0),
+        wave_limit=0.1,
+        coefficient_range=(0.5, 2.0),
+        coefficient_spread=0.25,
+        filter_range=(4.0, 8.0),
+        shift_gap_range=(4.0, 6.0),
     ),
 }
 
@@ -131,6 +208,11 @@ def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
         require(value in PRESETS, "conditions", value, ", ".join(PRESETS))
         return PRESETS[value]
     return build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
+
+
+def preset_of(conditions: Conditions | None) -> str:
+    """The name of the preset that some conditions are; empty if they are none."""
+    return next((name for name, preset in PRESETS.items() if preset == conditions), "")
 
 
 _ADAPTER = TypeAdapter(Conditions)

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.support.validation import real_array, require
 
-# Controllers are given this long after a change of the joint references, s.
-RECOVERY = 7.0
+# Controllers are given this long after a change of the joint references, s, and where one follows
+# another within `SCAN_GAP`, as in a scan.
+RECOVERY, SCAN_RECOVERY, SCAN_GAP = 7.0, 3.0, 6.0
 TIME_TOLERANCE = 1e-9
 # Begins the names of the metric of Table 1, one per axis, and ends those of attitude errors.
 MAX_ERROR, ANGLE_ERROR = "max_error_", "_error"
@@ -39,24 +40,55 @@ def max_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> ND
 
 
 def settled_error(
-    time: ArrayLike, error: ArrayLike, shifts: Sequence[float], settle_time: float = 5.0
+    time: ArrayLike,
+    error: ArrayLike,
+    shifts: Sequence[float],
+    settle_time: float = 5.0,
+    recovery: float = RECOVERY,
 ) -> NDArray[np.float64]:
-    """The same maximum, leaving out the 7 s after every change of the joint references.
+    """The same maximum, leaving out a while after every change of the joint references.
 
     Args:
         time: Times, s, shape (samples,).
         error: True position errors, m, shape (samples, axes).
         shifts: When the joint references change, s.
         settle_time: From when on errors count, s.
+        recovery: How long is left out, s.
 
     Returns:
         Largest |error| by axis, m, shape (axes,).
     """
     times, errors, late = _checked(time, error, settle_time)
     for shift in shifts:
-        late &= (times < shift) | (times >= shift + RECOVERY)
+        late &= (times < shift) | (times >= shift + recovery)
     require(late.any(), "shifts", shifts, f"some of the time up to {times[-1]} s left")
     return np.asarray(np.abs(errors[late]).max(axis=0))
+
+
+def recovery_from(shifts: Sequence[float]) -> float:
+    """How long after each change of the joint references a settled error does not count, s."""
+    scan = bool(np.any(np.diff(shifts) < SCAN_GAP))
+    return SCAN_RECOVERY if scan else RECOVERY
+
+
+def shift_errors(time: ArrayLike, error: ArrayLike, shifts: Sequence[float]) -> NDArray[np.float64]:
+    """Largest absolute error from every change of the joint references to the next.
+
+    Args:
+        time: Times, s, shape (samples,).
+        error: True position errors, m, shape (samples, axes).
+        shifts: When the joint references change, s, rising.
+
+    Returns:
+        Largest |error| by shift and axis, m, shape (shifts, axes).
+
+    Raises:
+        ValueError: If shapes do not match, a value is not finite or no sample follows a shift.
+    """
+    times, errors, _ = _checked(time, error, 0.0)
+    first = np.searchsorted(times, np.asarray(shifts) - TIME_TOLERANCE)
+    require((first < times.size).all(), "shifts", shifts, f"times up to {times[-1]} s")
+    return np.maximum.reduceat(np.abs(errors), first) if first.size else errors[:0]
 
 
 def rms_error(time: ArrayLike, error: ArrayLike, settle_time: float = 5.0) -> NDArray[np.float64]:

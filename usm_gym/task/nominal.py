@@ -11,15 +11,23 @@ from usm_gym.support.validation import require
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal knowledge from which policies are made; no true coefficient, no current.
+    """The nominal knowledge from which policies are made: nothing that is drawn for an episode.
 
     Attributes:
         robot: The robot with its nominal coefficients; `usm_gym.world.world_of` gives its axes.
         control_period: Time between two actions, s.
         thruster_time_constant: First-order lag of the thrusters, s.
         position_noise: Standard deviation of the position measurement, per axis, m.
-        position_delay: By how many control periods the measured position is late.
+        position_delay: By how many control periods a measured position is late.
         action_delay: After how many control periods a command takes effect.
+        position_period: Control periods between measurements of the position.
+        velocity_period: The same of the velocity; None if nothing measures it.
+        velocity_delay: By how many control periods a measured velocity is late.
+        velocity_noise: Standard deviation of the velocity measurement, per axis, m/s.
+        tail_angle_noise: The same of the measured angle of the tail, rad.
+        joint_angle_noise: The same of the joint angles, rad.
+        rate_noise: The same of the rates of tail and joints, rad/s.
+        thruster_dead_band: Commands below this make no force, N.
     """
 
     robot: Any
@@ -28,6 +36,14 @@ class Nominal:
     position_noise: float
     position_delay: int = 0
     action_delay: int = 0
+    position_period: int = 1
+    velocity_period: int | None = None
+    velocity_delay: int = 0
+    velocity_noise: float = 0.0
+    tail_angle_noise: float = 0.0
+    joint_angle_noise: float = 0.0
+    rate_noise: float = 0.0
+    thruster_dead_band: float = 0.0
 
 
 def shared_nominal(scenarios: Iterable[Any]) -> Nominal:

@@ -81,7 +81,31 @@ class ObservationLayout(Layout):
                 1.1,
                 "command in effect over the thruster limit, after saturation",
             ),
-            Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest force of a thruster"),
+            Entry("thruster_limit", 1, "N", 20.0, 1000.0, "largest command of a thruster"),
+            Entry(
+                "position_age",
+                1,
+                "s",
+                1.0,
+                10_000.0,
+                "time since the position was measured",
+            ),
+            Entry(
+                "velocity",
+                2,
+                "m/s",
+                0.1,
+                10.0,
+                "velocity over ground (x, y) at the time of its measurement; 0 without a sensor",
+            ),
+            Entry(
+                "velocity_age",
+                1,
+                "s",
+                1.0,
+                10_000.0,
+                "time since the velocity was measured; -1 without a sensor",
+            ),
         )
 
 
@@ -117,8 +141,10 @@ def find_error(row, lanes, lane, plant, error):
 
 
 @piece
-def measure(row, lanes, lane, plant, reference, measured, table, attitude_error, observation):
-    """Fill in the observation of one robot.
+def measure(
+    row, lanes, lane, plant, reference, measured, angle_noise, table, attitude_error, observation
+):
+    """Fill in the observation of one robot, but for ages and the velocity.
 
     Args:
         row: Block of the robot.
@@ -127,24 +153,26 @@ def measure(row, lanes, lane, plant, reference, measured, table, attitude_error,
         plant: What all robots share.
         reference: What `find_error` has returned.
         measured: Position error as it is measured, m, (2,).
+        angle_noise: Errors of the measured angles, then of their rates, (2 links,), or (0,).
         table: Table of the observation.
-        attitude_error: Where to write the heading error as it is known on board, rad, (1,).
+        attitude_error: Where to write how far the heading is from what is asked for on board, rad,
+            (1,).
         observation: Where to write the observation.
     """
     links, guidance = plant.links, body_rows(plant.links, plant.thruster_links.size)
     measure_position(reference, measured, table, observation)
     mean, head = measure_links(row, lanes, lane, links, table, observation)
-    heading = head if number(row, lanes, lane, guidance + HEAD_HEADING) > 0.0 else mean
+    mean_noise, head_noise = add_angle_noise(angle_noise, links, table, observation)
+    of_head = number(row, lanes, lane, guidance + HEAD_HEADING) > 0.0
     distance = measured[1]
     if number(row, lanes, lane, guidance + CROSS_TRACK) == 0.0:
         distance += reference[1]
     look_ahead = number(row, lanes, lane, guidance + LOOK_AHEAD)
-    attitude_error[0] = heading - line_of_sight(distance, look_ahead)
+    attitude_error[0] = (head if of_head else mean) - line_of_sight(distance, look_ahead)
     k = table.starts[ENTRY.heading_error]
     observation[k] = attitude_error[0] * table.gain[k]
+    observation[k] += (head_noise if of_head else mean_noise) * table.gain[k]
     measure_thrusters(row, lanes, lane, links, table, observation)
-    for k in range(observation.size):
-        observation[k] = min(max(observation[k], -table.bound[k]), table.bound[k])
 
 
 @piece
@@ -195,12 +223,41 @@ def measure_links(row, lanes, lane, links, table, observation):
 
 
 @piece
+def add_angle_noise(noise, links, table, observation):
+    """Add errors to the angles; returns what they make of the mean angle and the head's, rad."""
+    starts, gain, _ = table
+    if noise.size == 0:
+        return 0.0, 0.0
+    tail, tail_rate = starts[ENTRY.tail_angle], starts[ENTRY.tail_rate]
+    observation[tail] += noise[0] * gain[tail]
+    observation[tail_rate] += noise[links] * gain[tail_rate]
+    angle = noise[0]
+    total = angle
+    for i in range(links - 1):
+        k = starts[ENTRY.joint_angles] + i
+        observation[k] += noise[1 + i] * gain[k]
+        k = starts[ENTRY.joint_rates] + i
+        observation[k] += noise[links + 1 + i] * gain[k]
+        angle -= noise[1 + i]
+        total += angle
+    return total / links, angle
+
+
+@piece
+def measure_age(entry, age, table, observation):
+    """Fill in how old a measurement is, s."""
+    k = table.starts[entry]
+    observation[k] = age * table.gain[k]
+
+
+@piece
 def measure_thrusters(row, lanes, lane, links, table, observation):
     """Fill in the last commands and the limit."""
     starts, gain, _ = table
-    limit, commands = number(row, lanes, lane, LIMIT), first_command(links)
     k = starts[ENTRY.thruster_command]
-    for j in range(starts[ENTRY.thruster_limit] - k):
+    thrusters = starts[ENTRY.thruster_limit] - k
+    limit, commands = number(row, lanes, lane, LIMIT), thruster_row(COMMAND, links, thrusters)
+    for j in range(thrusters):
         observation[k + j] = number(row, lanes, lane, commands + j) / limit * gain[k + j]
     k = starts[ENTRY.thruster_limit]
     observation[k] = limit * gain[k]

@@ -9,12 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from usm_gym.plant.layout import MAX_SHIFTS
 from usm_gym.robot import Robot
 from usm_gym.robots import PAPER, name_of, robot_of
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD, PRESETS, Conditions
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.scenario import STILL, Inspection, Mode, Path, Scenario, draw_water, mode_of
+from usm_gym.task.scenario import STILL, Inspection, Mode, Path, Scenario, mode_of
+
+# Length of a scan, s, and from when on its errors count: an adaptive law has seen some shifts.
+SCAN_DURATION, SCAN_SETTLE_TIME = 60.0, 20.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,8 @@ class Recipe:
         if not self.bending:
             return STILL
         bending_joints = int(stream.integers(max(1, joints // 3), most_bending(joints) + 1))
+        if conditions.shift_gap_range is not None:
+            return _draw_scan(conditions, conditions.shift_gap_range, bending_joints, stream)
         side = 1.0 if stream.random() < 0.5 else -1.0
         first, second = stream.uniform(*conditions.deflection_range, 2)
         third = stream.uniform(-0.35, 0.35)
@@ -62,6 +68,28 @@ class Recipe:
             deflections=(side * first, -side * second, third),
             filter_frequency=stream.uniform(*conditions.filter_range),
         )
+
+
+def _draw_scan(
+    conditions: Conditions,
+    gap_range: tuple[float, float],
+    bending_joints: int,
+    stream: np.random.Generator,
+) -> Inspection:
+    """Draw shifts that follow each other to the end; all are drawn that could fit in."""
+    low, high = gap_range
+    smallest, largest = conditions.deflection_range
+    gaps, sizes, sides = stream.random((3, MAX_SHIFTS))
+    filter_frequency = stream.uniform(*conditions.filter_range)
+    times = np.cumsum(low + (high - low) * gaps)
+    sizes = (smallest + (largest - smallest) * sizes) * np.where(sides < 0.5, 1.0, -1.0)
+    shifts = int(np.sum(times <= SCAN_DURATION - low))
+    return Inspection(
+        bending_joints=bending_joints,
+        times=tuple(times[:shifts].tolist()),
+        deflections=tuple(sizes[:shifts].tolist()),
+        filter_frequency=filter_frequency,
+    )
 
 
 RECIPES: dict[Mode, Recipe] = {
@@ -128,13 +156,13 @@ def sample(
     path = recipe.draw_path(stream)
     inspection = recipe.draw_motion(conditions, joints, stream)
     noise_seed = int(stream.integers(2**63))
-    return dataclasses.replace(
+    asked = dataclasses.replace(
         named("nominal", mode, conditions, robot),
         path=path,
         inspection=inspection,
-        water=draw_water(conditions, noise_seed),
         noise_seed=noise_seed,
     )
+    return asked.under(conditions)
 
 
 def named(
@@ -159,6 +187,18 @@ def named(
         look_ahead=recipe.look_ahead,
         robot=robot,
     )
+    gap_range = nominal.conditions.shift_gap_range
+    if name == "nominal" and gap_range is not None:
+        gap = sum(gap_range) / 2
+        times = tuple(np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS].tolist())
+        sides = tuple(0.98 * (-1.0) ** k for k in range(len(times)))
+        scan = Inspection(bending_joints=bending_joints, times=times, deflections=sides)
+        return dataclasses.replace(
+            nominal,
+            inspection=scan if recipe.bending else STILL,
+            duration=SCAN_DURATION,
+            settle_time=SCAN_SETTLE_TIME,
+        )
     if name == "nominal":
         return nominal
     at_once = dataclasses.replace(nominal.inspection, filter_frequency=None)

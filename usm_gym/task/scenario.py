@@ -1,4 +1,4 @@
-"""What happens in an episode: path, joint motion, conditions, water; sampling and JSON.
+"""What happens in an episode: path, joint motion, conditions, water; its JSON.
 
 All of it is plain data. A `Scenario` fixes an episode completely, sensor noise included, and is the
 same in JSON (`to_dict`, `from_dict`).
@@ -18,15 +18,11 @@ from usm_gym.plant.layout import MAX_SHIFTS
 from usm_gym.robot import Damping, Robot, Stiffness
 from usm_gym.robots import PAPER, robot_of
 from usm_gym.support.validation import Count, Number, Switch, build, require, validated
-from usm_gym.task.conditions import (
-    FIELD,
-    LARGEST_CURRENT,
-    Coefficient,
-    Conditions,
-    FilterFrequency,
-)
+from usm_gym.task.conditions import FIELD, Coefficient, Conditions, FilterFrequency
 from usm_gym.task.guidance import path_positions
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.sensing import Sensing, sensing
+from usm_gym.task.water import Water, draw_water
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
@@ -34,11 +30,6 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 MOST_PHYSICS_STEPS = 100_000_000
 
 Time = Annotated[Number, Field(ge=0, le=3600)]
-Velocity = Annotated[Number, Field(ge=-LARGEST_CURRENT, le=LARGEST_CURRENT)]
-Phase = Annotated[Number, Field(ge=-100, le=100)]
-
-# Spawn keys of the streams that a noise seed opens.
-NOISE, WATER = range(2)
 
 
 @validated
@@ -67,7 +58,7 @@ class Inspection:
 
     Attributes:
         bending_joints: How many joints bend, counted from the head, 1 to 255.
-        times: When the deflection changes, up to 8 rising times, 0 to 3600 s.
+        times: When the deflection changes, up to 16 rising times, 0 to 3600 s.
         deflections: To what it changes at those times, -100 to 100 rad.
         filter_frequency: Natural frequency of the critically damped second-order filter between
             those steps and the joint references, 0.01 to 1000 rad/s; None leaves them steps.
@@ -94,28 +85,6 @@ STILL = Inspection(bending_joints=1, times=(), deflections=())
 
 
 @validated
-class Water:
-    """The water of one episode, which no controller is told.
-
-    Attributes:
-        current: Constant part of the water's velocity, global frame, -5 to 5 m/s.
-        amplitude: Amplitude of its sinusoidal part, by axis, -5 to 5 m/s.
-        phase: Phase of that part at the start, -100 to 100 rad.
-        period: Period of that part, 0.1 to 1e6 s.
-        coefficients: True over nominal value of (c_t, c_n, mu_n, lambda_1, lambda_2, lambda_3), the
-            same for all links, 0.01 to 100.
-    """
-
-    current: tuple[Velocity, Velocity] = (0.0, 0.0)
-    amplitude: tuple[Velocity, Velocity] = (0.0, 0.0)
-    phase: tuple[Phase, Phase] = (0.0, 0.0)
-    period: Annotated[Number, Field(ge=0.1, le=1e6)] = 20.0
-    coefficients: tuple[
-        Coefficient, Coefficient, Coefficient, Coefficient, Coefficient, Coefficient
-    ] = (1.0,) * 6
-
-
-@validated
 class Scenario:
     """One episode, complete.
 
@@ -125,10 +94,12 @@ class Scenario:
         inspection: Joint motion.
         conditions: Sensors, actuators, timing.
         water: The water of this episode.
+        thruster_gains: Force of each thruster over its command, 0.01 to 100; none: 1. No controller
+            is told.
         duration: Length of the episode, 1e-6 to 3600 s; a multiple of the control period, and
             100 million physics steps at most.
         settle_time: From when on errors count, 0 to 3600 s.
-        noise_seed: Seed of the sensor noise, 0 to 2^64 - 1.
+        noise_seed: Seed of the sensors' errors and gaps, 0 to 2^64 - 1.
         joint_stiffness: Joint controllers' proportional gain, 0 to 1e6 N m/rad; None: the robot's.
         joint_damping: Joint controllers' derivative gain, 0 to 1e6 N m s/rad; None: the robot's.
         heading: Whether heading means the mean link angle or the head link's.
@@ -145,6 +116,7 @@ class Scenario:
     inspection: Inspection = Inspection()
     conditions: Conditions = FIELD
     water: Water = Water()
+    thruster_gains: tuple[Coefficient, ...] = ()
     duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0
     settle_time: Time = 5.0
     noise_seed: Annotated[int, Strict(), Field(ge=0, lt=2**64)] = 0
@@ -209,6 +181,14 @@ class Scenario:
             position_noise=conditions.position_noise,
             position_delay=conditions.position_delay,
             action_delay=conditions.action_delay,
+            position_period=conditions.position_period,
+            velocity_period=conditions.velocity_period,
+            velocity_delay=conditions.velocity_delay,
+            velocity_noise=conditions.velocity_noise,
+            tail_angle_noise=conditions.tail_angle_noise,
+            joint_angle_noise=conditions.joint_angle_noise,
+            rate_noise=conditions.rate_noise,
+            thruster_dead_band=conditions.thruster_dead_band,
         )
 
     @property
@@ -216,10 +196,12 @@ class Scenario:
         """When the joint references change, s; empty if the joints keep still."""
         return self.inspection.times if self.conditions.motion else ()
 
-    def noise(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Measurement error of the position at every control instant, m, shape (steps + 1, 2)."""
-        stream = np.random.default_rng(np.random.SeedSequence(self.noise_seed, spawn_key=(NOISE,)))
-        return self.conditions.position_noise * stream.standard_normal((self.steps + 1, 2))
+    def sensing(self) -> Sensing:
+        """What the sensors make of the truth: of tail and joints, angles come before rates."""
+        conditions, joints = self.conditions, self.body.links - 1
+        angles = [conditions.tail_angle_noise, *[conditions.joint_angle_noise] * joints]
+        rates = [conditions.rate_noise] * (1 + joints)
+        return sensing(conditions, self.steps, 2, angles + rates, self.noise_seed)
 
     def reference_positions(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Reference of the position at every control instant, m, shape (steps + 1, 2)."""
@@ -237,9 +219,10 @@ class Scenario:
         return positions
 
     def under(self, conditions: Conditions) -> Scenario:
-        """The same episode under other conditions, its water redrawn from the same noise seed."""
-        water = draw_water(conditions, self.noise_seed)
-        return dataclasses.replace(self, conditions=conditions, water=water)
+        """The same episode under other conditions; water and gains are redrawn from its seed."""
+        body = self.body
+        water, gains = draw_water(conditions, self.noise_seed, body.links, len(body.thrusters))
+        return dataclasses.replace(self, conditions=conditions, water=water, thruster_gains=gains)
 
     def to_dict(self) -> dict[str, Any]:
         """The scenario in JSON's types; the paper's robot goes without saying."""
@@ -261,27 +244,6 @@ class Scenario:
 _ADAPTER = TypeAdapter(Scenario)
 
 
-def draw_water(conditions: Conditions, noise_seed: int) -> Water:
-    """Draw the water of an episode.
-
-    Every number comes from the same place of the same stream whatever the conditions, so that
-    a change of conditions stretches an episode's water rather than replace it.
-    """
-    stream = np.random.default_rng(np.random.SeedSequence(noise_seed, spawn_key=(WATER,)))
-    unit = stream.uniform(-1.0, 1.0, 4)
-    phase = stream.uniform(0.0, 2 * math.pi, 2)
-    period = stream.uniform(10.0, 40.0)
-    low, high = conditions.coefficient_range
-    coefficients = low + (high - low) * stream.random(6)
-    return Water(
-        current=_pair(conditions.current_limit * unit[:2]),
-        amplitude=_pair(conditions.current_variation * unit[2:]),
-        phase=_pair(phase),
-        period=period,
-        coefficients=tuple(coefficients.tolist()),
-    )
-
-
 def mode_of(value: Any) -> Mode:
     """The mode of a name.
 
@@ -291,8 +253,3 @@ def mode_of(value: Any) -> Mode:
     require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
     mode: Mode = value
     return mode
-
-
-def _pair(values: Any) -> tuple[float, float]:
-    x, y = values.tolist()
-    return x, y

@@ -72,7 +72,17 @@ RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-
 # Where agents are taken that they have not been trained for.
 TRANSFER: dict[str, Conditions] = {
     "ideal": PRESETS["ideal"],
-    "rough": PRESETS["rough"],
+    # The preset of this name in 0.1.0.
+    "rough": Conditions(
+        thruster_time_constant=0.1,
+        thruster_limit=15.0,
+        position_noise=2e-4,
+        current_limit=0.1,
+        current_variation=0.05,
+        coefficient_range=(0.6, 1.5),
+        deflection_range=(0.9, 2.1),
+        filter_range=(8.0, 14.0),
+    ),
     "still": replace(FIELD, motion=False),
     "coefficients": replace(FIELD, coefficient_range=(0.6, 1.4)),
 }

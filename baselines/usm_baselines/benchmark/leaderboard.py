@@ -15,8 +15,8 @@ from usm_baselines.benchmark.results import (
 )
 from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal
 from usm_baselines.contender import Contender, contender
-from usm_baselines.gains import FRONT, read_gains
-from usm_baselines.registry import ids
+from usm_baselines.gains import FOLDERS, FRONT, read_gains
+from usm_baselines.tiers import PAPER, meant_for
 from usm_gym.evaluation import Evaluation
 from usm_gym.statistics import compare, interquartile_mean, interval
 from usm_gym.suites import NAMES, suite
@@ -28,8 +28,8 @@ from usm_gym.task.scenario import Scenario
 
 MAIN = "operation"
 STILL = "operation, joints still"
-# The policies with the paper's gains.
-PAPER = ("sta", "pd")
+# By tier, the suite on which gains that are tuned for it and for the others are compared.
+CROSSED = {"field": MAIN, "basin": f"{MAIN}-basin", "sea": f"{MAIN}-sea"}
 
 
 @validated
@@ -177,9 +177,9 @@ def suites() -> dict[str, list[Scenario]]:
     return chosen
 
 
-def everyone() -> list[Contender]:
-    """All registered policies, also those on request and no competitors."""
-    return [contender(id) for id in ids()]
+def everyone(scenarios: Sequence[Scenario]) -> list[Contender]:
+    """All policies that are meant for scenarios, also those on request and no competitors."""
+    return [contender(id) for id in meant_for(scenarios[0].conditions)]
 
 
 def front() -> dict[str, list[Contender]]:
@@ -196,17 +196,21 @@ def front() -> dict[str, list[Contender]]:
 
 
 def places(
-    contenders: Sequence[Contender],
+    contenders: Sequence[Contender] | None,
     fronts: Mapping[str, Sequence[Contender]],
     chosen: Mapping[str, Sequence[Scenario]],
     time_limit: float = TIME_LIMIT,
 ) -> list[Place]:
-    """Every policy on every suite, and the fronts on the main one."""
+    """Every policy on every suite, and the fronts on the main one.
+
+    Without policies, everyone on the suites that they are meant for.
+    """
     listed = []
     for name, scenarios in chosen.items():
         nominal = shared_nominal(scenarios)
         besides = [policy for row in fronts.values() for policy in row] if name == MAIN else []
-        for policy in (*contenders, *besides):
+        meeting = everyone(scenarios) if contenders is None else contenders
+        for policy in (*meeting, *besides):
             listed.append(Place(name, Job(policy, tuple(scenarios), nominal, time_limit)))
     return listed
 
@@ -285,8 +289,34 @@ def best_of_laws(rows: Mapping[str, Standing]) -> dict[str, Standing]:
     """
     best: dict[str, str] = {}
     for id in rows:
-        best.setdefault(id.removesuffix("-tuned").removesuffix("-lag"), id)
+        best.setdefault(law_of(id).removesuffix("-lag"), id)
     return {id: row for id, row in rows.items() if id in best.values() or id in PAPER}
+
+
+def law_of(id: str) -> str:
+    """The id of a policy without what its name says of its gains."""
+    law, _, gains = id.rpartition("-")
+    return law if gains in FOLDERS else id
+
+
+def crossed(result: LeaderboardResult) -> dict[str, dict[str, str]]:
+    """Laws whose gains for every tier were scored in every tier.
+
+    Returns:
+        By law, its policies by the tier for which they are tuned.
+    """
+    if not all(suite in result.suites for suite in CROSSED.values()):
+        return {}
+    laws: dict[str, dict[str, str]] = {}
+    for id, row in result.main.items():
+        if row.tuned_for in CROSSED and id != law_of(id):
+            laws.setdefault(law_of(id), {})[row.tuned_for] = id
+    rows = [result.suites[suite] for suite in CROSSED.values()]
+    return {
+        law: {tier: tuned[tier] for tier in CROSSED}
+        for law, tuned in laws.items()
+        if set(tuned) == set(CROSSED) and all(id in each for each in rows for id in tuned.values())
+    }
 
 
 def standing(

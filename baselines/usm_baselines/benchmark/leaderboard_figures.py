@@ -43,23 +43,24 @@ def _errors(result: LeaderboardResult) -> Any:
     """Mean error of every law on every suite, with its interval."""
     from matplotlib import pyplot as plt
 
-    names, axes = list(best_of_laws(result.main)), result.axes
-    height = 0.25 * len(names) + 1.2
+    best, axes = {suite: best_of_laws(rows) for suite, rows in result.suites.items()}, result.axes
+    heights = [0.25 * len(rows) + 1.2 for rows in best.values()]
     figure, panels = plt.subplots(
-        *(len(result.suites), len(axes)),
-        figsize=(4.5 * len(axes), height * len(result.suites)),
+        *(len(best), len(axes)),
+        figsize=(4.5 * len(axes), sum(heights)),
+        height_ratios=heights,
         squeeze=False,
         sharex=True,
         layout="constrained",
     )
-    for line, (suite, rows) in zip(panels, result.suites.items(), strict=True):
+    for line, (suite, rows) in zip(panels, best.items(), strict=True):
+        names = list(rows)
         for panel, axis in zip(line, axes, strict=True):
-            for place, name in enumerate(names):
-                if name in rows:
-                    error = rows[name].errors[axis]
-                    low, high = error.ci95
-                    panel.plot([1e3 * low, 1e3 * high], [place, place], color="C0")
-                    panel.plot(1e3 * error.mean, place, "o", color="C0", markersize=4)
+            for place, row in enumerate(rows.values()):
+                error = row.errors[axis]
+                low, high = error.ci95
+                panel.plot([1e3 * low, 1e3 * high], [place, place], color="C0")
+                panel.plot(1e3 * error.mean, place, "o", color="C0", markersize=4)
             panel.set(xscale="log", xlabel=f"error in {axis} [mm]", ylim=(len(names) - 0.5, -0.5))
             panel.set_yticks(range(len(names)), names if axis == axes[0] else [""] * len(names))
             panel.set_title(suite, fontsize=10)

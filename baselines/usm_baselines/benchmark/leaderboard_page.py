@@ -8,8 +8,24 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from usm_baselines.benchmark.leaderboard import Lead, LeaderboardResult, Standing, best_of_laws
-from usm_baselines.benchmark.results import Summary, attitude_in, axes_in, rms_in
+from usm_baselines.benchmark.leaderboard import (
+    CROSSED,
+    Lead,
+    LeaderboardResult,
+    Standing,
+    best_of_laws,
+    crossed,
+)
+from usm_baselines.benchmark.results import (
+    Summary,
+    attitude_in,
+    axes_in,
+    lost,
+    medians_in,
+    over_informed,
+    rms_in,
+    shifts_in,
+)
 from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.support.text import degrees, figures, listed, mm
 from usm_gym.support.validation import require
@@ -28,30 +44,48 @@ the objective by which gains and agents are chosen: the means in {axes} added up
 per degree of heading error and {variation} mm per N/s of thrust variation. The rank of a row is the
 place of the first row from which the data do not tell it. "Beats the next" says whether the
 interval of the paired difference to the next row leaves out 0, and with what probability an episode
-goes better.
+goes better. "Over informed" is a row's means over those of the law that is told what is constant in
+an episode: the distance that knowledge could close.
+"""
+MEDIAN_LEGEND = """\
+Where robots are lost, and in scans, a table also has the median of the largest error, mm, and the
+share of lost robots; a lost one counts as half a metre or more in the mean.
+"""
+SHIFT_LEGEND = "Largest error from a shift of the joint references to the next, mm, mean, {axes}.\n"
+CROSS_LEGEND = """\
+Gains tuned for one tier of conditions, scored in all: largest error after settling, mm, mean,
+{axes}.
 """
 
 
 def table(rows: Mapping[str, Standing]) -> str:
     """The rows of a suite as Markdown."""
     axes, angles = axes_in(rows.values()), attitude_in(rows.values())
-    columns = ["told", *(f"{axis}, mm" for axis in axes)]
+    medians = medians_in(rows.values())
+    tuned = any(row.tuned_for for row in rows.values())
+    columns = ["told", *(["tuned for"] if tuned else []), *(f"{axis}, mm" for axis in axes)]
+    columns += [f"median {axis}" for axis in medians]
     columns += [f"{what} {axis}" for what in ("middle half", "worst") for axis in axes]
     columns += [f"rms {axis}" for axis in rms_in(rows.values())]
     columns += [f"{angle}, °" for angle in angles]
+    ratios = over_informed(rows)
+    columns += ["over informed"] if ratios else []
     lines = _head([*columns, "objective", "thrust, N", "variation, N/s", "lost", "beats the next"])
     places = rank_labels(rows)
     for id, row in rows.items():
         errors = row.errors.values()
-        cells = [row.told, *map(_mean, errors)]
+        cells = [row.told, *([row.tuned_for or ""] if tuned else []), *map(_mean, errors)]
+        cells += [mm(row.medians[axis]) for axis in medians]
         cells += [mm(error.iqm) for error in row.middle] + [mm(error.worst) for error in errors]
         cells += [mm(error.mean) for error in row.rms.values()]
         cells += [degrees(error.mean) for error in row.attitude.values()]
+        cells += [ratios[id]] if ratios else []
         cells.append(figures(row.objective))
         cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
         lead = row.beats_next
         decision = "" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})"
-        lines.append(_line(places[id], id, row, [*cells, str(row.failures), decision]))
+        cells += [lost(row, bool(medians)), decision]
+        lines.append(_line(places[id], id, row, cells))
     return "\n".join([*lines, *_notes(rows)]) + "\n"
 
 
@@ -72,6 +106,30 @@ def brief_table(rows: Mapping[str, Standing]) -> str:
         cells = [row.told, *map(_mean, errors), rms, worst, *attitude, variation]
         lines.append(_line(places[id], id, row, [*cells, str(row.failures)]))
     return "\n".join([*lines, *_notes(rows)]) + "\n"
+
+
+def shift_table(rows: Mapping[str, Standing]) -> str:
+    """The errors by shift of a suite of scans, as Markdown."""
+    shifts = shifts_in(rows.values())
+    lines = [f"| policy | {' | '.join(shifts)} |", "|---|" + "---:|" * len(shifts)]
+    for id, row in rows.items():
+        cells = [_means(row.by_shift[shift]) for shift in shifts]
+        lines.append(f"| {id} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def cross_table(result: LeaderboardResult) -> str:
+    """Laws with the gains for every tier in every tier, as Markdown; empty if there are none."""
+    laws = crossed(result)
+    if not laws:
+        return ""
+    lines = [f"| law | tuned for | {' | '.join(CROSSED.values())} |", "|---|---|" + "---:|" * 3]
+    for law, policies in laws.items():
+        for tier, id in policies.items():
+            rows = {at: result.suites[suite][id] for at, suite in CROSSED.items()}
+            cells = [f"{_means(row.errors)}, {lost(row, True)} lost" for row in rows.values()]
+            lines.append(f"| {law} | {tier} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
 
 
 def rank_labels(rows: Mapping[str, Standing]) -> dict[str, str]:
@@ -96,13 +154,20 @@ def markdown(result: LeaderboardResult) -> str:
     legend = LEGEND.format(
         axes=listed(result.axes), attitude=ATTITUDE_WEIGHT, variation=VARIATION_WEIGHT
     )
+    axes = " / ".join(result.axes)
     parts = [f"# Leaderboard of usm-gym {result.version}\n", legend]
+    if any(medians_in(rows.values()) for rows in result.suites.values()):
+        parts.append(MEDIAN_LEGEND)
     for name, rows in result.suites.items():
         episodes = next(iter(rows.values())).episodes
         parts.append(f"## {name} ({episodes} episodes)\n")
         parts.append(table(rows))
+        if shifts_in(rows.values()):
+            parts += [SHIFT_LEGEND.format(axes=axes), shift_table(rows)]
         for id, reason in result.refused.get(name, {}).items():
             parts.append(f"{id} is refused: {reason}\n")
+    if table_of_tiers := cross_table(result):
+        parts += ["## Gains across tiers\n", CROSS_LEGEND.format(axes=axes), table_of_tiers]
     return "\n".join(parts)
 
 
@@ -125,21 +190,30 @@ def with_table(page: str, result: LeaderboardResult) -> str:
 
 
 def csv_text(result: LeaderboardResult) -> str:
-    """One line per policy and suite; errors in m and rad, thrust in N, variation in N/s."""
-    scores = [name for name in next(iter(result.main.values())).metrics if name not in NO_COLUMN]
-    head = ["suite", "rank", "policy", "told", "competitor", "objective", "failures"]
+    """One line per policy and suite; errors in m and rad, thrust in N, variation in N/s.
+
+    A metric that a suite does not have is left empty there.
+    """
+    listed = [row for rows in result.suites.values() for row in rows.values()]
+    names = dict.fromkeys(name for row in listed for name in row.metrics)
+    scores = [name for name in names if name not in NO_COLUMN]
+    head = ["suite", "rank", "policy", "told", "tuned_for", "competitor", "objective", "failures"]
     for name in scores:
-        head += [name, f"{name}_low", f"{name}_high", f"{name}_worst"]
+        head += [name, *(f"{name}_{column}" for column in ("low", "high", "worst", "median"))]
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(head)
     for suite, rows in result.suites.items():
         for id, row in rows.items():
-            line: list[object] = [suite, row.rank, id, row.told, row.competitor]
+            line: list[object] = [suite, row.rank, id, row.told, row.tuned_for, row.competitor]
             line += [row.objective, row.failures]
             for name in scores:
-                summary = row.metrics[name]
-                line += [summary.mean, *summary.ci95, summary.worst]
+                summary = row.metrics.get(name)
+                line += (
+                    [None] * 5
+                    if summary is None
+                    else [summary.mean, *summary.ci95, summary.worst, summary.median]
+                )
             writer.writerow(line)
     return out.getvalue()
 
@@ -159,6 +233,10 @@ def _line(place: str, id: str, row: Standing, cells: Sequence[str]) -> str:
 def _notes(rows: Mapping[str, Standing]) -> list[str]:
     notes = sorted({row.note for row in rows.values() if row.note})
     return [f"\n{MARK} {'; '.join(notes)}."] if notes else []
+
+
+def _means(errors: Mapping[str, Summary]) -> str:
+    return " / ".join(mm(error.mean) for error in errors.values())
 
 
 def _mean(error: Summary) -> str:

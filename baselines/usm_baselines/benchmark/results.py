@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import KW_ONLY, asdict
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, TypeAdapter
 
 from usm_baselines.contender import Contender
+from usm_gym.evaluation import SHIFT_METRICS
 from usm_gym.statistics import Comparison
 from usm_gym.support.results import Interval, Part, Provenance, Result
+from usm_gym.support.text import figures
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
 from usm_gym.task.stored_scenario import StoredScenarios
 
 Failures = Annotated[int, Field(strict=True, ge=0)]
+Share = Annotated[Number, Field(ge=0, le=1)]
 
 
 @validated
@@ -27,11 +30,14 @@ class Summary(Part):
         mean: Mean.
         ci95: Its 95 % interval.
         worst: Worst episode.
+        median: Median, which no lost robot moves; None if it is not kept.
     """
 
     mean: Number
     ci95: Interval
     worst: Number
+    _: KW_ONLY
+    median: Number | None = None
 
 
 @validated
@@ -55,12 +61,15 @@ class Scores(Part):
         metrics: Summaries by metric; in JSON they stand beside the other fields.
         failures: How many episodes lost the robot.
         per_episode: What is kept of the episodes, by metric.
+        lost_share: Share of the episodes that lost the robot; None if it is not kept.
     """
 
     beside: ClassVar[str] = "metrics"
     metrics: Mapping[str, Summary]
     failures: Failures
     per_episode: Mapping[str, tuple[Number | Switch, ...]]
+    _: KW_ONLY
+    lost_share: Share | None = None
 
     def __post_init__(self) -> None:
         """Refuse scores that lack what tables and pages show."""
@@ -112,6 +121,18 @@ class Scores(Part):
         """The largest error of the attitude after settling, rad, by angle."""
         return {name: self.metrics[name + ANGLE_ERROR] for name in attitude_of(self.metrics)}
 
+    @property
+    def medians(self) -> dict[str, float]:
+        """The median of the largest error after settling, m, by axis, as far as it is kept."""
+        found = {axis: error.median for axis, error in self.errors.items()}
+        return {axis: median for axis, median in found.items() if median is not None}
+
+    @property
+    def by_shift(self) -> dict[str, dict[str, Summary]]:
+        """The largest error after some shifts of a scan, m, by shift and axis; else none."""
+        known = [name for name in SHIFT_METRICS if f"{name}_{self.axes[0]}" in self.metrics]
+        return {name.removesuffix("_shift_error"): self.by_axis(name) for name in known}
+
     def by_axis(self, metric: str) -> dict[str, Summary]:
         """The summary of a metric such as "settled_error", by axis."""
         return {axis: self.metrics[f"{metric}_{axis}"] for axis in self.axes}
@@ -125,17 +146,24 @@ class CompetitorScores(Scores):
         competitor: False if it is told more than a vehicle knows.
         told: What it is told besides the measured position and the reference; empty if unknown.
         note: What to bear in mind about its scores.
+        tuned_for: The preset of conditions for which its gains are tuned; None if for none.
     """
 
     competitor: Switch
     told: str = ""
     note: str = ""
+    tuned_for: str | None = None
 
     @staticmethod
     def about(contender: Contender) -> dict[str, Any]:
         """What is kept of a policy besides its scores."""
         competes = not contender.privileged
-        return {"competitor": competes, "told": contender.told, "note": contender.note}
+        return {
+            "competitor": competes,
+            "told": contender.told,
+            "note": contender.note,
+            "tuned_for": contender.tuned_for or None,
+        }
 
 
 def require_alike(rows: Iterable[Scores]) -> None:
@@ -149,6 +177,51 @@ def require_alike(rows: Iterable[Scores]) -> None:
     require(len(axes) <= 1, "axes", axes, "the same for every policy")
     episodes = sorted({row.episodes for row in listed})
     require(len(episodes) <= 1, "episodes", episodes, "as many for every policy")
+
+
+def medians_in(rows: Iterable[Scores]) -> tuple[str, ...]:
+    """The axes of which a table shows medians.
+
+    A lost robot counts as half a metre, so that a mean says little where one is lost. Then, and in
+    scans, tables also show the median and the share of lost robots.
+    """
+    listed = list(rows)
+    shown = any(row.failures or row.by_shift for row in listed)
+    kept = all(len(row.medians) == len(row.axes) for row in listed)
+    return axes_in(listed) if shown and kept else ()
+
+
+def shifts_in(rows: Iterable[Scores]) -> tuple[str, ...]:
+    """The shifts after which all rows have errors; none if there is no row."""
+    listed = [tuple(row.by_shift) for row in rows]
+    return listed[0] if len(set(listed)) == 1 else ()
+
+
+# Its law is told what is constant in an episode.
+INFORMED = "informed"
+
+
+def over_informed(rows: Mapping[str, Scores]) -> dict[str, str]:
+    """Mean errors of each row over those of the law that is told what is constant, by name.
+
+    That is how far knowledge could take it. Empty if no such law is among the rows.
+    """
+    told = [row for id, row in rows.items() if id.partition("-")[0] == INFORMED]
+    if not told:
+        return {}
+    best = min(told, key=lambda row: row.objective)
+
+    def ratio(row: Scores) -> str:
+        pairs = zip(row.errors.values(), best.errors.values(), strict=True)
+        return " / ".join(figures(own.mean / limit.mean) for own, limit in pairs)
+
+    return {id: ratio(row) for id, row in rows.items()}
+
+
+def lost(row: Scores, shared: bool) -> str:
+    """How many robots a policy has lost, if wanted with their share."""
+    share = f" ({100 * row.failures / row.episodes:.0f} %)" if shared and row.failures else ""
+    return f"{row.failures}{share}"
 
 
 def attitude_in(rows: Iterable[Scores]) -> tuple[str, ...]:

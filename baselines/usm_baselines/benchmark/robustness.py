@@ -38,12 +38,45 @@ class Quantity:
     vary: Callable[[Scenario, float], Scenario]
 
 
-def condition(field: str, scale: float = 1.0) -> Callable[[Scenario, float], Scenario]:
-    """Sets a field of the conditions, leaving the water as it is."""
+def condition(*fields: str, scale: float = 1.0) -> Callable[[Scenario, float], Scenario]:
+    """Sets fields of the conditions, leaving water and gains as they are."""
 
     def vary(scenario: Scenario, value: float) -> Scenario:
-        changed: dict[str, Any] = {field: scale * value}
+        changed: dict[str, Any] = dict.fromkeys(fields, scale * value)
         return replace(scenario, conditions=replace(scenario.conditions, **changed))
+
+    return vary
+
+
+def periods(field: str) -> Callable[[Scenario, float], Scenario]:
+    """Sets a field of the conditions that counts control periods."""
+
+    def vary(scenario: Scenario, value: float) -> Scenario:
+        whole = float(value).is_integer()
+        require(whole, field, value, "a whole number of control periods")
+        changed: dict[str, Any] = {field: int(value)}
+        return replace(scenario, conditions=replace(scenario.conditions, **changed))
+
+    return vary
+
+
+def drawn(field: str) -> Callable[[Scenario, float], Scenario]:
+    """Stretches what is drawn within a limit: water, or what links differ in."""
+
+    def vary(scenario: Scenario, value: float) -> Scenario:
+        changed: dict[str, Any] = {field: value}
+        return scenario.under(replace(scenario.conditions, **changed))
+
+    return vary
+
+
+def spread(field: str) -> Callable[[Scenario, float], Scenario]:
+    """Stretches about 1 what is drawn from a range."""
+
+    def vary(scenario: Scenario, value: float) -> Scenario:
+        require(0 <= value < 1, f"spread of {field}", value, "0 or more, below 1")
+        changed: dict[str, Any] = {field: (1.0 - value, 1.0 + value)}
+        return scenario.under(replace(scenario.conditions, **changed))
 
     return vary
 
@@ -62,26 +95,9 @@ def amplitude(scenario: Scenario, factor: float) -> Scenario:
     return replace(scenario, inspection=replace(scenario.inspection, deflections=deflections))
 
 
-def current(scenario: Scenario, limit: float) -> Scenario:
-    """Stretches the current."""
-    return scenario.under(replace(scenario.conditions, current_limit=limit))
-
-
-def model(scenario: Scenario, spread: float) -> Scenario:
-    """Stretches the true coefficients about the nominal ones."""
-    require(0 <= spread < 1, "model", spread, "0 or more, below 1")
-    limits = (1.0 - spread, 1.0 + spread)
-    return scenario.under(replace(scenario.conditions, coefficient_range=limits))
-
-
-def delay(scenario: Scenario, periods: float) -> Scenario:
-    """Lets commands take effect later."""
-    require(periods == int(periods), "delay", periods, "a whole number of control periods")
-    return replace(scenario, conditions=replace(scenario.conditions, action_delay=int(periods)))
-
-
 def rate(scenario: Scenario, frequency: float) -> Scenario:
-    """Lets the controller act more or less often."""
+    """Lets the controller act more or less often; sensors keep their periods in its periods."""
+    require(frequency > 0, "control rate", frequency, "more than 0 Hz")
     conditions = scenario.conditions
     substeps = round(1.0 / (frequency * conditions.physics_step))
     period = round(substeps * conditions.physics_step, 12)
@@ -92,26 +108,74 @@ QUANTITIES = {
     "noise": Quantity(
         "position noise, standard deviation [mm]",
         (0.0, 0.02, 0.05, 0.1, 0.2, 0.5),
-        condition("position_noise", 1e-3),
+        condition("position_noise", scale=1e-3),
+    ),
+    "fix-period": Quantity(
+        "period of the position fixes [control periods]",
+        (1.0, 2.0, 5.0, 10.0, 25.0),
+        periods("position_period"),
+    ),
+    "fix-delay": Quantity(
+        "delay of the position fixes [control periods]",
+        (0.0, 1.0, 2.0, 3.0, 5.0),
+        periods("position_delay"),
+    ),
+    "fix-missing": Quantity(
+        "share of the position fixes that never arrive [1]",
+        (0.0, 0.02, 0.1, 0.2, 0.5),
+        condition("position_missing"),
+    ),
+    "angle-noise": Quantity(
+        "noise of all angles and rates, standard deviation [mrad, mrad/s]",
+        (0.0, 1.0, 2.0, 5.0, 10.0),
+        condition("tail_angle_noise", "joint_angle_noise", "rate_noise", scale=1e-3),
     ),
     "lag": Quantity(
         "time constant of the thrusters [s]",
         (0.0, 0.02, 0.05, 0.1, 0.2),
         condition("thruster_time_constant"),
     ),
-    "delay": Quantity("delay of the commands [control periods]", (0.0, 1.0, 2.0, 3.0, 5.0), delay),
+    "delay": Quantity(
+        "delay of the commands [control periods]",
+        (0.0, 1.0, 2.0, 3.0, 5.0),
+        periods("action_delay"),
+    ),
     "limit": Quantity(
         "thruster limit [N]", (2.5, 5.0, 10.0, 20.0, 40.0), condition("thruster_limit")
     ),
+    "dead-band": Quantity(
+        "dead-band of the thrusters [N]", (0.0, 0.1, 0.2, 0.4, 0.8), condition("thruster_dead_band")
+    ),
+    "gain": Quantity(
+        "error of each thruster's gain, up to [1]",
+        (0.0, 0.1, 0.2, 0.3, 0.4),
+        spread("thruster_gain_range"),
+    ),
     "speed": Quantity("speed of the joints, factor [1]", (0.25, 0.5, 1.0, 2.0, 4.0), speed),
     "amplitude": Quantity("head deflection, factor [1]", (0.0, 0.5, 1.0, 1.5, 2.0), amplitude),
-    "current": Quantity("largest current in each axis [m/s]", (0.0, 0.05, 0.1, 0.15, 0.2), current),
+    "current": Quantity(
+        "largest current in each axis [m/s]",
+        (0.0, 0.05, 0.1, 0.15, 0.2),
+        drawn("current_limit"),
+    ),
+    "waves": Quantity(
+        "largest speed of the water in waves [m/s]",
+        (0.0, 0.05, 0.1, 0.2, 0.4),
+        drawn("wave_limit"),
+    ),
     "model": Quantity(
-        "error of the hydrodynamic coefficients, up to [1]", (0.0, 0.2, 0.4, 0.6), model
+        "error of the hydrodynamic coefficients, up to [1]",
+        (0.0, 0.2, 0.4, 0.6),
+        spread("coefficient_range"),
+    ),
+    "links": Quantity(
+        "error of each link's coefficients beside the common one, up to [1]",
+        (0.0, 0.1, 0.2, 0.3, 0.5),
+        drawn("coefficient_spread"),
     ),
     "rate": Quantity("control rate [Hz]", (10.0, 20.0, 25.0, 50.0, 100.0), rate),
     "step": Quantity(
-        "physics step [ms]", (0.1, 0.2, 0.5, 1.0, 2.0), condition("physics_step", 1e-3)
+        "physics step [ms]", (0.1, 0.2, 0.5, 1.0, 2.0), condition("physics_step", scale=1e-3)
     ),
 }
 
@@ -124,7 +188,13 @@ class ScoredPoint(Scores):
         value: The value.
     """
 
-    order: ClassVar[tuple[str, ...]] = ("value", "metrics", "failures", "per_episode")
+    order: ClassVar[tuple[str, ...]] = (
+        "value",
+        "metrics",
+        "failures",
+        "lost_share",
+        "per_episode",
+    )
     value: Number
 
 
@@ -186,6 +256,14 @@ class RobustnessResult(Result):
         return axes_in(self._scored)
 
     @property
+    def scored(self) -> dict[str, list[ScoredPoint]]:
+        """The points with scores by policy."""
+        return {
+            name: [point for point in points if isinstance(point, ScoredPoint)]
+            for name, points in self.results.items()
+        }
+
+    @property
     def refused(self) -> dict[str, str]:
         """Why there are no scores, by policy and value."""
         return {
@@ -197,8 +275,7 @@ class RobustnessResult(Result):
 
     @property
     def _scored(self) -> list[ScoredPoint]:
-        points = [point for row in self.results.values() for point in row]
-        return [point for point in points if isinstance(point, ScoredPoint)]
+        return [point for points in self.scored.values() for point in points]
 
 
 def jobs(
@@ -235,30 +312,3 @@ def curves(
     ]
     size = len(values)
     return {name: tuple(points[size * k : size * (k + 1)]) for k, name in enumerate(names)}
-
-
-def draw(result: RobustnessResult) -> Any:
-    """Draw the errors axis by axis against the quantity, with their intervals, by matplotlib."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    columns = max(len(result.axes), 1)
-    figure, (panels,) = plt.subplots(
-        1, columns, figsize=(5 * columns, 4.5), squeeze=False, layout="constrained"
-    )
-    for panel, axis in zip(panels, result.axes, strict=False):
-        for number, (name, points) in enumerate(result.results.items()):
-            scored = [point for point in points if isinstance(point, ScoredPoint)]
-            errors = [point.errors[axis] for point in scored]
-            places = [point.value for point in scored]
-            colour = f"C{number % 10}"
-            panel.plot(places, [1e3 * e.mean for e in errors], ".-", color=colour, label=name)
-            low, high = ([1e3 * e.ci95[side] for e in errors] for side in (0, 1))
-            panel.fill_between(places, low, high, color=colour, alpha=0.2, linewidth=0)
-        panel.set(yscale="log", xlabel=result.label, ylabel=f"error in {axis} [mm]")
-        panel.grid(alpha=0.3)
-    if result.axes:
-        panels[0].legend(fontsize=8)
-    return figure

@@ -24,7 +24,15 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from usm_baselines.contender import Contender
-from usm_gym.evaluation import BATCH, Evaluation, batches, evaluate, joined, metric_names
+from usm_gym.evaluation import (
+    BATCH,
+    Evaluation,
+    batches,
+    evaluate,
+    joined,
+    metric_names,
+    scored_by_shift,
+)
 from usm_gym.policy import Policy, is_privileged, nominal_of
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
@@ -230,7 +238,8 @@ def _read(cache: Path | None, job: Job) -> Evaluation | None:
     try:
         kept = _KEPT.validate_python(read_json(file))
         names, episodes = list(kept.per_episode), len(job.scenarios)
-        expected = metric_names(world_of(job.scenarios[0].body))
+        by_shift = all(map(scored_by_shift, job.scenarios))
+        expected = metric_names(world_of(job.scenarios[0].body), by_shift)
         require(names == expected, "per_episode", names, ", ".join(expected))
         lengths = {len(kept.failed), *map(len, kept.per_episode.values())}
         require(lengths == {episodes}, "number of episodes", sorted(lengths), str(episodes))

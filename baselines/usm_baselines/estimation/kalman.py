@@ -167,8 +167,18 @@ def correct(correction, y, state):
 
 
 @piece
+def inputs(signals, mass, model, b, axis):
+    """Last command over the inertia and known acceleration of an axis, m/s^2; see `estimate`."""
+    acceleration = signals.acceleration[b, axis]
+    last = (signals.u[b, axis] + acceleration) * mass / model.inertia[axis]
+    return last, -acceleration - model.damping[axis] * signals.velocity[b, axis]
+
+
+@piece
 def estimate(signals, mass, model, b, axis, state):
     """One period of the filter on what was measured of robot b and applied to it, in place.
+
+    A position that was seen before is no measurement.
 
     Args:
         signals: `usm_baselines.signals.Signals`.
@@ -181,15 +191,14 @@ def estimate(signals, mass, model, b, axis, state):
     Returns:
         Last command over the inertia and known acceleration, m/s^2, and the innovation, m.
     """
-    y, acceleration = signals.y[b, axis], signals.acceleration[b, axis]
-    velocity = signals.velocity[b, axis]
-    last = (signals.u[b, axis] + acceleration) * mass / model.inertia[axis]
-    known = -acceleration - model.damping[axis] * velocity
+    y = signals.y[b, axis]
+    last, known = inputs(signals, mass, model, b, axis)
     innovation = 0.0
     if signals.started[b] == 0.0:
-        start(y, velocity, state)
+        start(y, signals.velocity[b, axis], state)
     else:
         predict(model.transition[axis], last, known, state)
-        innovation = y - state[ERROR]
-        correct(model.correction[axis], y, state)
+        if signals.fresh[b]:
+            innovation = y - state[ERROR]
+            correct(model.correction[axis], y, state)
     return last, known, innovation

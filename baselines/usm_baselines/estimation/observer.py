@@ -123,3 +123,30 @@ def observe(implicit, started, y, u, velocity, h, k, state):
     if implicit:
         return implicit_observer(y, u, h, k, state)
     return explicit_observer(y, u, h, k, state)
+
+
+@piece
+def perceive(signals, b, axis, implicit, h, k, state):
+    """`observe` on the signals of a robot in an axis; or what a navigator estimates of both.
+
+    With a navigator, position and velocity count as measured, and the disturbance as unknown: the
+    paper's first case, in which (9) needs no observer.
+
+    Args:
+        signals: `usm_baselines.signals.Signals`.
+        b: Which robot.
+        axis: Which axis.
+        implicit: Whether to take the implicit step.
+        h: Step, s.
+        k: Gains (k1, k2, k3).
+        state: (p1, p2, p3, e), advanced in place.
+
+    Returns:
+        The corrections (z1, z2), m/s and m/s^2.
+    """
+    if signals.navigated:
+        state[ERROR], state[RATE] = signals.y[b, axis], signals.rate[b, axis]
+        state[DISTURBANCE] = 0.0
+        return 0.0, 0.0
+    started, velocity = signals.started[b], signals.velocity[b, axis]
+    return observe(implicit, started, signals.y[b, axis], signals.u[b, axis], velocity, h, k, state)

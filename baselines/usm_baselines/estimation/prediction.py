@@ -14,6 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_baselines.estimation import kalman
+from usm_baselines.estimation.navigator import (
+    is_needed,
+    memory_size,
+    navigate,
+    navigation,
+    transition_of,
+)
 from usm_baselines.signals import Array, Signals, commanded
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
@@ -22,6 +30,7 @@ from usm_gym.planar_world import PlanarWorld
 from usm_gym.plant.chain import Plant
 from usm_gym.plant.layout import *
 from usm_gym.plant.step import advance
+from usm_gym.plant.thrusters import delivered
 from usm_gym.robot import Robot
 from usm_gym.sensors import value
 from usm_gym.support.validation import require
@@ -34,6 +43,9 @@ from usm_gym.world import world_of
 AXES = len(PlanarWorld.axes)
 NAMES = ("error", "rate", "unmodelled")
 ESTIMATES = AXES * len(NAMES)
+# A belief about a robot: true over nominal coefficients, the current in m/s, then the force of each
+# thruster over its command, then the coefficients of each link over those common to all.
+COEFFICIENTS, CURRENT, THRUSTER_GAINS = 0, 6, 8
 # Physics steps of a prediction in a control period.
 SUBSTEPS = 5
 # The frequency that is assumed of the joint references' filter, rad/s.
@@ -74,6 +86,7 @@ def nominal_plant(nominal: Nominal) -> NominalPlant:
         plant,
         filter_frequency=REFERENCE_FREQUENCY,
         time_constant=nominal.thruster_time_constant,
+        dead_band=nominal.thruster_dead_band,
     )
     row[SHIFT_STEP] = -1.0
     layout = world_of(robot).layout
@@ -108,7 +121,7 @@ def place_references(seen, nominal, block, lane):
 
 
 @piece
-def place(seen, nominal, state, applied, block, lane):
+def place(seen, nominal, state, applied, belief, block, lane):
     """Put a robot where an observation and the estimates say it is.
 
     Args:
@@ -116,12 +129,18 @@ def place(seen, nominal, state, applied, block, lane):
         nominal: The nominal robot.
         state: State of the predictor, of the time of the observation.
         applied: The observation that tells the commands over the coming period.
+        belief: What it is believed to be.
         block: Block of the robot, (rows * WIDTH,).
         lane: Its place in the block.
     """
     links, thrusters = nominal.plant.links, nominal.plant.thruster_links.size
     for r in range(nominal.row.size):
         block[r * WIDTH + lane] = nominal.row[r]
+    for k in range(CURRENT):
+        block[(C_T + k) * WIDTH + lane] *= belief[COEFFICIENTS + k]
+    for i in range(links):
+        factor = belief[THRUSTER_GAINS + thrusters + i]
+        block[(row_of(FACTOR, links) + i) * WIDTH + lane] = factor
     theta = value(seen, nominal, ENTRY.tail_angle, 0)
     omega = value(seen, nominal, ENTRY.tail_rate, 0)
     for i in range(links):
@@ -137,13 +156,17 @@ def place(seen, nominal, state, applied, block, lane):
         block[(V_X + axis) * WIDTH + lane] = velocity
         # All water accelerating by d accelerates the centre of mass by d and turns nothing.
         block[(WATER_AX + axis) * WIDTH + lane] = d
+        block[(WATER_X + axis) * WIDTH + lane] = belief[CURRENT + axis]
     place_references(seen, nominal, block, lane)
     limit = value(applied, nominal, ENTRY.thruster_limit, 0)
-    first = first_command(links)
+    forces = thruster_row(FORCE, links, thrusters)
+    targets = thruster_row(TARGET, links, thrusters)
     for j in range(thrusters):
         command = value(applied, nominal, ENTRY.thruster_command, j) * limit
-        block[(first + j) * WIDTH + lane] = command
-        block[(first + thrusters + j) * WIDTH + lane] = state[ESTIMATES + j]
+        gain = belief[THRUSTER_GAINS + j]
+        target = delivered(command, gain, nominal.row[DEAD_BAND])
+        block[(targets + j) * WIDTH + lane] = target
+        block[(forces + j) * WIDTH + lane] = state[ESTIMATES + j]
 
 
 @compiled
@@ -165,7 +188,7 @@ def error_ahead(seen, nominal, time, axis, block, lane):
 
 
 @compiled
-def place_all(observation, nominal, state, past, blocks):
+def place_all(observation, nominal, state, past, beliefs, blocks):
     """`place` every robot of a batch, lane by lane; lanes that are left over stay idle.
 
     Args:
@@ -173,41 +196,73 @@ def place_all(observation, nominal, state, past, blocks):
         nominal: The nominal robot.
         state: State of the predictor, (batch, size).
         past: Whether to place them as they were a period ago, with the commands known by now.
+        beliefs: What they are believed to be, (batch, numbers).
         blocks: Where to write, (blocks, rows * WIDTH).
     """
     last = ESTIMATES + nominal.plant.thruster_links.size
     for b in range(observation.shape[0]):
         seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
         if past:
-            place(own[last:], nominal, own, seen, block, lane)
+            place(own[last:], nominal, own, seen, beliefs[b], block, lane)
         else:
-            place(seen, nominal, own, seen, block, lane)
+            place(seen, nominal, own, seen, beliefs[b], block, lane)
+
+
+@piece
+def predicted(seen, before, started, nominal, block, lane, axis, estimate):
+    """Fill in (e, v, d) of an axis as the block predicts it for now; at the start, as measured."""
+    if started == 0.0:
+        y = value(seen, nominal, ENTRY.position_error, axis)
+        rate = -value(seen, nominal, ENTRY.reference_velocity, axis)
+        estimate[0], estimate[1], estimate[2] = y, rate, 0.0
+    else:
+        e, v = error_ahead(before, nominal, nominal.h, axis, block, lane)
+        estimate[0], estimate[1] = e, v
+
+
+@piece
+def note(seen, started, nominal, block, lane, own):
+    """Keep the thrusters' forces and the observation of a robot for the next period."""
+    thrusters = nominal.plant.thruster_links.size
+    forces = thruster_row(FORCE, nominal.plant.links, thrusters)
+    for j in range(thrusters):
+        own[ESTIMATES + j] = block[(forces + j) * WIDTH + lane] if started > 0.0 else 0.0
+    for k in range(seen.size):
+        own[ESTIMATES + thrusters + k] = seen[k]
 
 
 @compiled
-def update(observation, started, nominal, correction, blocks, state):
-    """Bring the state of a batch to the present, from its blocks and the measured position."""
-    thrusters = nominal.plant.thruster_links.size
-    for b in range(observation.shape[0]):
-        seen, own, block, lane = observation[b], state[b], blocks[b // WIDTH], b % WIDTH
-        before = own[ESTIMATES + thrusters :]
+def update(signals, nominal, correction, blocks, state):
+    """Bring the state of a batch to the present, by the stationary filter of gain `correction`."""
+    last = ESTIMATES + nominal.plant.thruster_links.size
+    for b in range(signals.observation.shape[0]):
+        seen, own, block, lane = signals.observation[b], state[b], blocks[b // WIDTH], b % WIDTH
+        started = signals.started[b]
         for axis in range(AXES):
-            y, estimate = (
-                value(seen, nominal, ENTRY.position_error, axis),
-                own[3 * axis : 3 * axis + 3],
-            )
-            if started[b] == 0.0:
-                rate = -value(seen, nominal, ENTRY.reference_velocity, axis)
-                estimate[0], estimate[1], estimate[2] = y, rate, 0.0
-            else:
-                e, v = error_ahead(before, nominal, nominal.h, axis, block, lane)
-                estimate[0] = e + correction[axis, 0] * (y - e)
-                estimate[1] = v + correction[axis, 1] * (y - e)
-                estimate[2] += correction[axis, 2] * (y - e)
-        for j in range(thrusters):
-            row = first_command(nominal.plant.links) + thrusters + j
-            own[ESTIMATES + j] = block[row * WIDTH + lane] if started[b] > 0.0 else 0.0
-        before[:] = seen
+            estimate = own[3 * axis : 3 * axis + 3]
+            predicted(seen, own[last:], started, nominal, block, lane, axis, estimate)
+            if started > 0.0 and signals.fresh[b]:
+                off = value(seen, nominal, ENTRY.position_error, axis) - estimate[0]
+                for i in range(3):
+                    estimate[i] += correction[axis, i] * off
+        note(seen, started, nominal, block, lane, own)
+
+
+@compiled
+def update_late(signals, nominal, nav, transition, blocks, state):
+    """The same by the filter `nav` of `navigator`, whose memory comes last in the state."""
+    last = ESTIMATES + nominal.plant.thruster_links.size
+    estimate = np.empty(ESTIMATES)
+    for b in range(signals.observation.shape[0]):
+        seen, own, block, lane = signals.observation[b], state[b], blocks[b // WIDTH], b % WIDTH
+        started = signals.started[b]
+        estimate[:] = own[:ESTIMATES]
+        for axis in range(AXES):
+            mine = estimate[3 * axis : 3 * axis + 3]
+            predicted(seen, own[last:], started, nominal, block, lane, axis, mine)
+        navigate(seen, nav, started, transition, estimate, own[last + seen.size :])
+        own[:ESTIMATES] = estimate
+        note(seen, started, nominal, block, lane, own)
 
 
 @compiled
@@ -220,11 +275,12 @@ def read_ahead(observation, nominal, time, blocks, ahead):
 
 
 @piece
-def held_force(signals, model, b, axis):
+def held_force(signals, model, belief, b, axis):
     """Force, N, that the last commands of a robot make in an axis, its links being as they are."""
     force = 0.0
     for j in range(model.thrusters):
-        force += signals.allocation[b, axis, j] * commanded(signals.observation[b], model, j)
+        share = signals.allocation[b, axis, j] * belief[THRUSTER_GAINS + j]
+        force += share * commanded(signals.observation[b], model, j)
     return force
 
 
@@ -232,31 +288,49 @@ class Predictor:
     """Estimates where the robots of a batch are, and foresees where they will be.
 
     Its state is an array of numbers for each robot: (e, v, d) of each axis, the forces of the
-    thrusters in N, the last observation.
+    thrusters in N, the last observation, and where positions come late or rarely, the memory of a
+    navigator.
 
     Attributes:
         size: How many numbers that is.
     """
 
-    def __init__(self, nominal: Nominal, correction: Array) -> None:
-        """Keep the nominal robot.
+    def __init__(
+        self, nominal: Nominal, acceleration_noise: float, disturbance_noise: float
+    ) -> None:
+        """Keep the nominal robot, and set up the filter.
 
         Args:
             nominal: Nominal knowledge.
-            correction: Gains of the filter on (e, v, d), (2, 3).
+            acceleration_noise: Spectral density of what drives v, m/s^2 / sqrt(Hz).
+            disturbance_noise: Spectral density of what drives d, m/s^3 / sqrt(Hz).
 
         Raises:
-            ValueError: If the robot is not the planar one.
+            ValueError: If the robot is not the planar one, or a density is not above 0.
         """
-        self._nominal, self._correction = nominal_plant(nominal), correction
-        self.size = ESTIMATES + len(nominal.robot.thrusters) + self._nominal.scale.size
+        self._nominal = nominal_plant(nominal)
+        densities = acceleration_noise, disturbance_noise
+        self._linear = kalman.linear_model(nominal, *densities)
+        self._filter = navigation(nominal, *densities) if is_needed(nominal) else None
+        links, self._thrusters = nominal.robot.links, len(nominal.robot.thrusters)
+        self._neutral = np.ones(THRUSTER_GAINS + self._thrusters + links)
+        self._neutral[CURRENT:THRUSTER_GAINS] = 0.0
+        self.size = ESTIMATES + self._thrusters + self._nominal.scale.size
+        self.size += memory_size(self._filter) if self._filter else 0
+
+    def beliefs(self, state: Array) -> Array:
+        """What the robots of a batch are believed to be, (batch, numbers): here the nominal one."""
+        return np.tile(self._neutral, (len(state), 1))
 
     def estimate(self, signals: Signals, state: Array) -> None:
         """Bring the state, (batch, size), to the present, in place."""
         blocks = self._blocks(signals, state, past=True)
         advance_all(blocks, self._nominal.plant)
-        seen, started = signals.observation, signals.started
-        update(seen, started, self._nominal, self._correction, blocks, state)
+        if self._filter is None:
+            update(signals, self._nominal, self._linear.correction, blocks, state)
+        else:
+            transition = transition_of(self._linear, ESTIMATES)
+            update_late(signals, self._nominal, self._filter, transition, blocks, state)
 
     def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
         """Where estimated robots go if their last commands are held.
@@ -275,5 +349,5 @@ class Predictor:
     def _blocks(self, signals: Signals, state: Array, past: bool) -> Array:
         seen = signals.observation
         blocks = np.zeros((-(-len(seen) // WIDTH), self._nominal.row.size * WIDTH))
-        place_all(seen, self._nominal, state, past, blocks)
+        place_all(seen, self._nominal, state, past, self.beliefs(state), blocks)
         return blocks

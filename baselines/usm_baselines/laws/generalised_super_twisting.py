@@ -27,8 +27,8 @@ from usm_baselines.estimation.observer import (
     OBSERVER_GAIN,
     RATE,
     check_exponent,
-    observe,
     observer_gains,
+    perceive,
 )
 from usm_baselines.laws.super_twisting import (
     ALPHA,
@@ -122,12 +122,10 @@ def generalised_super_twisting(signals, h, mass, gains, state, force):
     """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
     k = observer_gains(gains.observer_gain, gains.k2_exponent)
     for b, axis in np.ndindex(force.shape):
-        own, started = state[b, axis], signals.started[b]
-        y, u = signals.y[b, axis], signals.u[b, axis]
-        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
-        if started == 0.0:
+        own, acceleration = state[b, axis], signals.acceleration[b, axis]
+        if signals.started[b] == 0.0:
             own[INTEGRAL], own[ALPHA] = 0.0, gains.alpha_start
-        z1, z2 = observe(True, started, y, u, velocity, h, k, own)
+        z1, z2 = perceive(signals, b, axis, True, h, k, own)
         sigma = gains.surface * own[ERROR] + own[RATE]
         alpha = own[ALPHA]
         beta, own[ALPHA] = adapt(sigma, alpha, h, gains)

@@ -54,7 +54,7 @@ class JointLQGGains(NamedTuple):
 
 
 @compiled
-def joint_lqg(signals, model, linear, gain, state, ahead, force):
+def joint_lqg(signals, model, linear, gain, state, beliefs, ahead, force):
     """Regulator for a batch, the disturbance being foreseen.
 
     Args:
@@ -63,13 +63,14 @@ def joint_lqg(signals, model, linear, gain, state, ahead, force):
         linear: The linear model.
         gain: Gains of the regulator, (axes, 4).
         state: State of the predictor, (batch, size).
+        beliefs: What the robots are believed to be, (batch, numbers).
         ahead: (error, rate) after each period foreseen, (periods, batch, axes, 2).
         force: Where to write, N, (batch, axes).
     """
     own, held, unit = np.empty(STATES), np.empty(STATES), np.empty(STATES)
     for b, axis in np.ndindex(force.shape):
         inertia, transition = linear.inertia[axis], linear.transition[axis]
-        last, thrust = held_force(signals, model, b, axis) / inertia, 0.0
+        last, thrust = held_force(signals, model, beliefs[b], b, axis) / inertia, 0.0
         for j in range(model.thrusters):
             thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
         own[ERROR], own[RATE] = state[b, 3 * axis], state[b, 3 * axis + 1]
@@ -85,14 +86,18 @@ def joint_lqg(signals, model, linear, gain, state, ahead, force):
 class JointLQG(LQG):
     """LQG control that foresees the joint motion; it keeps the state of a `Predictor`."""
 
-    Gains = JointLQGGains
+    Gains: type[Any] = JointLQGGains
     state = prediction.NAMES
+    linear = False
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
-        self._predictor = Predictor(nominal, self._linear.correction)
+        self._predictor = self._make_predictor(nominal)
+
+    def _make_predictor(self, nominal: Nominal) -> Predictor:
+        return Predictor(nominal, *self.densities)
 
     @cached_property
     def law_shape(self) -> tuple[int, ...]:
@@ -103,4 +108,5 @@ class JointLQG(LQG):
         """Estimate, foresee, regulate."""
         self._predictor.estimate(signals, state)
         ahead = self._predictor.foresee(signals, state, self._periods)
-        joint_lqg(signals, self._model, self._linear, self._gain, state, ahead, force)
+        beliefs = self._predictor.beliefs(state)
+        joint_lqg(signals, self._model, self._linear, self._gain, state, beliefs, ahead, force)

@@ -17,6 +17,7 @@ import numpy as np
 
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.kalman import COMMAND, DISTURBANCE, ERROR, RATE, THRUST
+from usm_baselines.estimation.navigator import is_needed
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
@@ -89,7 +90,12 @@ def lqg(signals, mass, model, gain, state, force):
     """Filter and regulator for a batch; fills in the force, N, (batch, axes)."""
     for b, axis in np.ndindex(force.shape):
         own = state[b, axis]
-        last, known, _ = kalman.estimate(signals, mass, model, b, axis, own)
+        if signals.navigated:
+            last, known = kalman.inputs(signals, mass, model, b, axis)
+            own[ERROR], own[RATE] = signals.y[b, axis], signals.rate[b, axis]
+            own[DISTURBANCE], own[THRUST] = signals.disturbance[b, axis], signals.thrust[b, axis]
+        else:
+            last, known, _ = kalman.estimate(signals, mass, model, b, axis, own)
         steady = -(own[DISTURBANCE] + known)
         force[b, axis] = model.inertia[axis] * regulate(gain[axis], steady, last, own)
 
@@ -102,14 +108,20 @@ class LQG(ScriptedPolicy):
     state: tuple[str, ...] = ("error", "rate", "unmodelled", "thrust")
     shown = ("rate", "unmodelled")
     planar = True
+    # Whether the linear model predicts.
+    linear = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute filter and regulator; gains other than the defaults by name."""
-        super().__init__(nominal, **gains)
-        own = self.gains
-        self._linear = kalman.linear_model(nominal, own.acceleration_noise, own.disturbance_noise)
-        weights = own.variation_weight * self._linear.inertia
+        super().__init__(nominal, navigated=self.linear and is_needed(nominal), **gains)
+        self._linear = kalman.linear_model(nominal, *self.densities)
+        weights = self.gains.variation_weight * self._linear.inertia
         self._gain = np.stack(list(map(regulator_gain, self._linear.transition, weights)))
+
+    @property
+    def densities(self) -> tuple[float, float]:
+        """Those among its gains."""
+        return self.gains.acceleration_noise, self.gains.disturbance_noise
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
         """Estimate, then regulate."""

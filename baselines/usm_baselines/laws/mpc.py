@@ -84,10 +84,10 @@ def receding_gain(transition: Array, periods: int, weight: float) -> Array:
 
 
 @compiled
-def receding(signals, model, inertia, gain, ahead, force):
+def receding(signals, model, inertia, gain, beliefs, ahead, force):
     """Add the first change to the force of the held commands; fills in the force, (batch, axes)."""
     for b, axis in np.ndindex(force.shape):
-        total = held_force(signals, model, b, axis)
+        total = held_force(signals, model, beliefs[b], b, axis)
         for i in range(ahead.shape[0]):
             total -= inertia[axis] * gain[axis, i] * ahead[i, b, axis, 0]
         force[b, axis] = total
@@ -107,12 +107,11 @@ class MPC(ScriptedPolicy):
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
-        linear = kalman.linear_model(
-            nominal, self.gains.acceleration_noise, self.gains.disturbance_noise
-        )
+        densities = self.gains.acceleration_noise, self.gains.disturbance_noise
+        linear = kalman.linear_model(nominal, *densities)
         self._periods = max(1, round(self.gains.horizon / nominal.control_period))
         self._inertia = linear.inertia
-        self._predictor = Predictor(nominal, linear.correction)
+        self._predictor = Predictor(nominal, *densities)
         weights = self.gains.variation_weight * linear.inertia
         self._gain = np.stack(
             [
@@ -130,4 +129,5 @@ class MPC(ScriptedPolicy):
         """Estimate, foresee, correct."""
         self._predictor.estimate(signals, state)
         ahead = self._predictor.foresee(signals, state, self._periods)
-        receding(signals, self._model, self._inertia, self._gain, ahead, force)
+        beliefs = self._predictor.beliefs(state)
+        receding(signals, self._model, self._inertia, self._gain, beliefs, ahead, force)

@@ -13,8 +13,8 @@ from usm_baselines.estimation.observer import (
     OBSERVER_GAIN,
     RATE,
     check_exponent,
-    observe,
     observer_gains,
+    perceive,
 )
 from usm_baselines.laws.super_twisting import SURFACE, compensating_force
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
@@ -86,10 +86,8 @@ def pd(signals, h, mass, gains, reading, state, force):
     """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
     k = observer_gains(gains.observer_gain, gains.k2_exponent)
     for b, axis in np.ndindex(force.shape):
-        own, started = state[b, axis], signals.started[b]
-        y, u = signals.y[b, axis], signals.u[b, axis]
-        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
-        z1, z2 = observe(True, started, y, u, velocity, h, k, own)
+        own, acceleration = state[b, axis], signals.acceleration[b, axis]
+        z1, z2 = perceive(signals, b, axis, True, h, k, own)
         force[b, axis] = pd_force(z1, z2, acceleration, mass, gains, reading, own)
 
 

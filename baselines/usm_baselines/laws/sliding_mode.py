@@ -21,8 +21,8 @@ from usm_baselines.estimation.observer import (
     OBSERVER_GAIN,
     RATE,
     check_exponent,
-    observe,
     observer_gains,
+    perceive,
 )
 from usm_baselines.laws.super_twisting import SURFACE
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
@@ -62,11 +62,10 @@ def sliding_mode(signals, h, mass, gains, state, force):
     k = observer_gains(gains.observer_gain, gains.k2_exponent)
     surface = gains.surface
     for b, axis in np.ndindex(force.shape):
-        own, started, y = state[b, axis], signals.started[b], signals.y[b, axis]
-        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
-        observe(True, started, y, signals.u[b, axis], velocity, h, k, own)
+        own, acceleration = state[b, axis], signals.acceleration[b, axis]
+        perceive(signals, b, axis, True, h, k, own)
         proportional = own[RATE] + 2.0 * surface * own[ERROR]
-        if started == 0.0:
+        if signals.started[b] == 0.0:
             own[INTEGRAL] = -proportional / (surface * surface)
         else:
             own[INTEGRAL] += h * own[ERROR]

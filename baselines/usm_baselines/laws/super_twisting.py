@@ -18,8 +18,8 @@ from usm_baselines.estimation.observer import (
     OBSERVER_GAIN,
     RATE,
     check_exponent,
-    observe,
     observer_gains,
+    perceive,
 )
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
@@ -163,12 +163,10 @@ def super_twisting(signals, h, mass, gains, implicit, state, force):
     """Observer and controller for a batch; fills in the force, N, (batch, axes)."""
     k = observer_gains(gains.observer_gain, gains.k2_exponent)
     for b, axis in np.ndindex(force.shape):
-        own, started = state[b, axis], signals.started[b]
-        y, u = signals.y[b, axis], signals.u[b, axis]
-        velocity, acceleration = signals.velocity[b, axis], signals.acceleration[b, axis]
-        if started == 0.0:
+        own, acceleration = state[b, axis], signals.acceleration[b, axis]
+        if signals.started[b] == 0.0:
             own[ALPHA] = gains.alpha_start
-        z1, z2 = observe(implicit, started, y, u, velocity, h, k, own)
+        z1, z2 = perceive(signals, b, axis, implicit, h, k, own)
         force[b, axis] = super_twisting_force(z1, z2, acceleration, h, mass, gains, implicit, own)
 
 

@@ -16,7 +16,7 @@ from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.plant.chain import directions, kinematics
 from usm_gym.plant.layout import *
 from usm_gym.plant.step import move_water, physics_step
-from usm_gym.plant.thrusters import allocate, allocation_matrix, saturated
+from usm_gym.plant.thrusters import allocate, allocation_matrix, delivered, saturated
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError
@@ -115,7 +115,7 @@ def simulate(scenario: Scenario, law: Law, every: int = 100, robot: Robot | None
     # Of this simulation only the start is used: it need not hold the noise of a whole episode.
     start = replace(scenario, duration=conditions.control_period, robot=body)
     simulation = Simulation([start])
-    noise = scenario.noise() if conditions.position_noise else np.zeros((1, 2))
+    noise = scenario.sensing().position if conditions.position_noise else np.zeros((1, 2))
     record = record_for(scenario.steps * conditions.substeps // every, body.links)
     blocks, plant = simulation.fleet.blocks, simulation.shared
     closed_loop(blocks, plant, body.total_mass, law, noise, every, record)
@@ -205,7 +205,9 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
     sine = row[row_of(SIN, links) :][:links]
     cosine = row[row_of(COS, links) :][:links]
     theta = row[row_of(THETA, links) :][:links]
-    commands = row[first_command(links) :][:thrusters]
+    commands = row[thruster_row(COMMAND, links, thrusters) :][:thrusters]
+    delivery = thruster_row(GAIN, links, thrusters)
+    targets = thruster_row(TARGET, links, thrusters)
     asked = row[body_rows(links, thrusters) :]
     T, wrench, work = np.empty((3, thrusters)), np.empty(3), np.empty((7, 3))
     sta, gains = law.reading == SUPER_TWISTING, law.super_twisting
@@ -241,11 +243,13 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
             )
             allocate(T, wrench, 3, work, commands)
             saturate(T, row[LIMIT], commands, force)
+            for j in range(thrusters):
+                row[targets + j] = delivered(commands[j], row[delivery + j], row[DEAD_BAND])
         if step % every == 0:
             write_down(
                 record, step // every, t, position, error, force, commands, theta, surface, state
             )
-        if plant.moving_water:
+        if plant.sinusoids > 0:
             move_water(block, 0.0, plant)
         base = kinematics(block, 0.0, wide, WIDTH, plant)
         physics_step(block, 0.0, wide, WIDTH, plant, base)

@@ -235,7 +235,7 @@ def test_a_snapshot_holds_the_base_too():
 
 
 def test_arguments_survive_the_spec_and_bad_ones_are_refused():
-    env = gym.make(ID, base="pd", residual_scale=3.0, action="thrusters", conditions="rough")
+    env = gym.make(ID, base="pd", residual_scale=3.0, action="thrusters", conditions="basin")
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
     first, second = env.reset(seed=0)[0], again.reset(seed=0)[0]
     assert (first == second).all()

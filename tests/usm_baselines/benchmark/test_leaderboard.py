@@ -1,6 +1,7 @@
 """The leaderboard: its suites, its order, and the tables that are published."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -9,13 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 from support.episodes import METRICS, short
+from support.results import PROVENANCE
+from support.tiers import register_with_tiers
 from usm_baselines import registry
 from usm_baselines.benchmark import leaderboard as board
 from usm_baselines.benchmark import leaderboard_page
+from usm_baselines.benchmark.scoring import Job, Refusal
 from usm_baselines.contender import contender
 
-from usm_gym.evaluation import Evaluation
-from usm_gym.suites import suite
+from usm_gym.evaluation import Evaluation, metric_names
+from usm_gym.planar_world import PlanarWorld
+from usm_gym.robot import Robot
+from usm_gym.suites import NAMES, suite
 from usm_gym.task.nominal import shared_nominal
 
 ROOT = Path(__file__).parents[3]
@@ -24,7 +30,7 @@ SUITES = {board.MAIN: short(3), "other": short(2, seed=1)}
 
 def test_every_suite_is_there_and_a_row_with_the_joints_still() -> None:
     chosen = board.suites()
-    assert len(chosen) == 6
+    assert set(chosen) == {*NAMES, board.STILL}
     assert chosen["table1"] == suite("table1")
     for moving, still in zip(chosen[board.MAIN], chosen[board.STILL], strict=True):
         assert moving.shifts
@@ -56,6 +62,92 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
     assert [each.gains.k_p for each in made] == [0.001, 0.01]
     places = board.places([], fronts, SUITES)
     assert [place.suite for place in places] == [board.MAIN] * 2
+
+
+def test_policies_meet_the_suites_that_they_are_meant_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    register_with_tiers(monkeypatch, tmp_path, "mine")
+    chosen = {name: suite(name)[:1] for name in NAMES}
+    mine = [
+        (place.suite, place.job.contender.name)
+        for place in board.places(None, {}, chosen)
+        if place.job.contender.name in ("mine-tuned", "mine-basin", "mine-sea")
+    ]
+    assert mine == [
+        ("operation", "mine-tuned"),
+        ("operation-ideal", "mine-tuned"),
+        ("operation-basin", "mine-basin"),
+        ("operation-sea", "mine-sea"),
+        ("torpedo", "mine-tuned"),
+        ("torpedo-sea", "mine-sea"),
+        ("table1", "mine-tuned"),
+    ]
+    named = board.places([contender("mine-sea")], {}, chosen)
+    assert [place.suite for place in named] == list(NAMES)
+
+
+def test_a_law_is_one_whatever_its_gains() -> None:
+    for id in ("lqg-joints-tuned", "lqg-joints-basin", "lqg-joints-sea", "lqg-joints"):
+        assert board.law_of(id) == "lqg-joints"
+
+
+def made_up(
+    tuned: dict[str, str], suites: tuple[str, ...], names: Sequence[str] = METRICS
+) -> board.LeaderboardResult:
+    """Return a leaderboard of policies with their tiers; the second loses one of two robots."""
+    scored: list[tuple[board.Place, Evaluation | Refusal]] = []
+    for name in suites:
+        scenarios = tuple(short(2))
+        for number, (id, tier) in enumerate(tuned.items()):
+            policy = replace(contender("pd"), name=id, tuned_for=tier)
+            job = Job(policy, scenarios, shared_nominal(scenarios))
+            errors = 1e-3 * (1 + number) * np.ones(2)
+            lost = np.array([False, number == 1])
+            errors[lost] = 0.5
+            scored.append((board.Place(name, job), Evaluation(dict.fromkeys(names, errors), lost)))
+    return board.leaderboard(scored, {}, "9", PROVENANCE)
+
+
+GAINS = {"pd-tuned": "field", "pd-basin": "basin", "pd-sea": "sea"}
+CROSSED = ("operation", "operation-basin", "operation-sea")
+
+
+def test_gains_of_every_tier_in_every_tier_make_a_cross_table() -> None:
+    result = made_up(GAINS, CROSSED)
+    lines = leaderboard_page.cross_table(result).splitlines()
+    assert lines[0] == "| law | tuned for | operation | operation-basin | operation-sea |"
+    assert [line.split(" | ")[:3] for line in lines[2:]] == [
+        ["| pd", "field", "1.00 / 1.00, 0 lost"],
+        ["| pd", "basin", "251 / 251, 1 (50 %) lost"],
+        ["| pd", "sea", "3.00 / 3.00, 0 lost"],
+    ]
+    assert leaderboard_page.cross_table(result) in leaderboard_page.markdown(result)
+    for less in (made_up(GAINS, CROSSED[:2]), made_up({"pd-tuned": "field"}, CROSSED)):
+        assert leaderboard_page.cross_table(less) == ""
+        assert "across tiers" not in leaderboard_page.markdown(less)
+
+
+def test_where_robots_are_lost_a_table_has_medians_and_their_share() -> None:
+    rows = made_up(GAINS, CROSSED).main
+    head, _, first, _, last, *_ = leaderboard_page.table(rows).splitlines()
+    cells = [dict(zip(head.split(" | "), line.split(" | "), strict=True)) for line in (first, last)]
+    assert [each["median x"] for each in cells] == ["1.00", "251"]
+    assert [each["lost"] for each in cells] == ["0", "1 (50 %)"]
+    assert [each["tuned for"] for each in cells] == ["field", "basin"]
+    kept = leaderboard_page.table(made_up({"pd": ""}, CROSSED).main)
+    assert "median" not in kept
+    assert "tuned for" not in kept
+
+
+def test_scans_have_a_table_of_errors_by_shift() -> None:
+    names = metric_names(PlanarWorld(Robot()), by_shift=True)
+    result = made_up({"pd": ""}, ("operation",), names)
+    lines = leaderboard_page.shift_table(result.main).splitlines()
+    assert lines[0] == "| policy | first | third | fifth | last |"
+    assert lines[2] == "| pd |" + " 1.00 / 1.00 |" * 4
+    assert leaderboard_page.shift_table(result.main) in leaderboard_page.markdown(result)
+    assert "first_shift_error_x" in leaderboard_page.csv_text(result).splitlines()[0].split(",")
 
 
 def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:

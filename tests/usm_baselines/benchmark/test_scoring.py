@@ -19,7 +19,7 @@ from usm_baselines.benchmark.scoring import Job, Refusal, score_all
 from usm_baselines.contender import Contender, contender
 
 import usm_gym
-from usm_gym import Robot
+from usm_gym import Inspection, Robot
 from usm_gym.evaluation import Evaluation
 from usm_gym.task.nominal import shared_nominal
 
@@ -150,6 +150,19 @@ def test_what_is_kept_is_not_computed_again(
     (again,) = score_all(jobs[:1], cache=tmp_path, progress=episodes.append)
     assert_same(again, first[0])
     assert episodes == [3]
+
+
+def test_what_is_kept_of_scans_has_the_errors_by_shift(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion = Inspection(times=(0.2, 0.3, 0.4, 0.5, 0.6), deflections=(0.1, -0.1, 0.1, -0.1, 0.1))
+    scans = tuple(replace(each, duration=8.0, inspection=motion) for each in SCENARIOS)
+    first = score_all([job("zero", scans)], cache=tmp_path)
+    monkeypatch.setattr(scoring, "score_batch", None)
+    (again,) = score_all([job("zero", scans)], cache=tmp_path)
+    assert_same(again, first[0])
+    assert isinstance(again, Evaluation)
+    assert "last_shift_error_y" in again.per_episode
 
 
 DAMAGES: dict[str, Callable[[dict[str, Any]], str]] = {

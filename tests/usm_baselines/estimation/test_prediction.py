@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import usm_baselines
-from usm_baselines.estimation import kalman
 from usm_baselines.estimation.prediction import Predictor
 from usm_baselines.signals import Signals
 
+from tests.support.laws import made_signals
 from usm_gym import Robot, Scenario, evaluate
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
@@ -27,23 +27,15 @@ def scenario(**changes: Any) -> Scenario:
 
 def signals(simulation: Simulation, started: bool) -> Signals:
     """Return what a predictor looks at."""
-    nothing = np.zeros((1, 2))
-    return Signals(
-        started=np.array([float(started)]),
-        y=nothing,
-        u=nothing,
-        velocity=nothing,
-        acceleration=nothing,
-        allocation=np.zeros((1, 3, 5)),
-        observation=simulation.observation.copy(),
-    )
+    nothing, seen = np.zeros((1, 2)), simulation.observation.copy()
+    begun = np.array([float(started)])
+    return made_signals(begun, nothing, nothing, nothing, nothing, observation=seen)
 
 
 def test_the_nominal_plant_is_foreseen() -> None:
     """Commands that are held, joints in full motion: where it goes and where it is said to go."""
     nominal = scenario().nominal
-    correction = kalman.linear_model(nominal, 1e-2, 0.1).correction
-    predictor = Predictor(nominal, correction)
+    predictor = Predictor(nominal, 1e-2, 0.1)
     state = np.zeros((1, predictor.size))
     simulation = Simulation([scenario()])
     rng = np.random.default_rng(0)

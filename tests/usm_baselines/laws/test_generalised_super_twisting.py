@@ -81,7 +81,7 @@ def test_constant_gains_are_adaptive_ones_that_keep_still() -> None:
     adaptive = usm_baselines.make(
         "agsta", NOMINAL, linear=3.0, epsilon=0.0, beta_offset=0.2, omega=0.0, alpha_start=0.7
     )
-    observation = np.zeros((1, 90), np.float32)
+    observation = np.zeros((1, 94), np.float32)
     observation[:, -1] = 1.0
     one = other = None
     for y in np.random.default_rng(0).normal(0.0, 0.1, 20):

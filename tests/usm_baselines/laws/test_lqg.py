@@ -7,8 +7,8 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.optimize import minimize
 from usm_baselines.estimation import kalman
 from usm_baselines.laws.lqg import LQG, regulate, regulator_gain
-from usm_baselines.signals import Signals
 
+from tests.support.laws import made_signals
 from usm_gym import Robot
 from usm_gym.task.nominal import Nominal
 
@@ -51,14 +51,12 @@ def test_a_constant_disturbance_is_found_and_held_off() -> None:
     x[:, 0], x[:, 2] = 0.02, [0.6, -0.3]
     acceleration, velocity = np.array([[0.05, -0.02]]), np.array([[0.1, 0.03]])
     for k in range(800):
-        signals = Signals(
+        signals = made_signals(
             started=np.array([float(k > 0)]),
             y=x[None, :, 0].copy(),
             u=u[None] * linear.inertia / mass - acceleration,
             velocity=velocity,
             acceleration=acceleration,
-            allocation=np.zeros((1, 3, 5)),
-            observation=np.zeros((1, 90), np.float32),
         )
         policy.control(signals, law, force)
         u = force[0] / linear.inertia

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 import usm_baselines
+from support.episodes import HARDER
 
 from usm_cli.selection import chosen_contenders
 from usm_gym import Robot, evaluate
 from usm_gym.evaluation import rollout, score
-from usm_gym.suites import suite
-from usm_gym.support.seeding import TUNING, stream
+from usm_gym.suites.__main__ import SEED
+from usm_gym.support.seeding import SUITE, TUNING, stream
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import sample
 
@@ -33,7 +34,8 @@ def test_leaves_hundredths_of_a_millimetre(conditions: str) -> None:
 
 def test_knows_the_limits_of_the_thrusters() -> None:
     # With clipped commands it would swing ever wider after the second change of the joints.
-    episode = dataclasses.replace(suite("operation-rough")[34], duration=24.0)
+    drawn = sample("operation", HARDER, stream(SEED, SUITE, 2, 34))
+    episode = dataclasses.replace(drawn, duration=24.0)
     (mine,), (others,) = (
         rollout(usm_baselines.make(id, episode.nominal), [episode]) for id in ("oracle", "mpc")
     )
@@ -63,8 +65,8 @@ def test_alone_and_side_by_side_the_bits_are_the_same(limit: float) -> None:
 
 def test_is_no_competitor_and_wants_the_truth() -> None:
     episodes = scenarios("field", 1)
-    assert "oracle" not in [each.name for each in chosen_contenders(None)]
+    assert "oracle" not in [each.name for each in chosen_contenders(None, PRESETS["field"])]
     policy: Any = usm_baselines.make("oracle", episodes[0].nominal)
     assert policy.privileged
     with pytest.raises(ValueError, match="snapshot is None; allowed: the true state"):
-        policy.predict(np.zeros((1, 90), np.float32))
+        policy.predict(np.zeros((1, 94), np.float32))

@@ -67,7 +67,7 @@ def test_the_force_is_that_of_the_reading(reading: int) -> None:
 @pytest.mark.parametrize("gains", [{}, {"k_p": 90.0, "k_d": 20.0, "surface": 2.0}])
 @pytest.mark.parametrize("id", READINGS)
 def test_the_policy_is_that_of_plain_python(id: str, gains: dict[str, float]) -> None:
-    env = gym.make("USM-Torpedo-v0", conditions="rough")
+    env = gym.make("USM-Torpedo-v0", conditions="basin")
     robot = Robot()
     policy = usm_baselines.make(id, env, **gains)
     observation, _ = env.reset(seed=5)
@@ -122,7 +122,7 @@ def test_a_stiffer_pd_is_better_and_one_without_gains_does_nothing() -> None:
     assert (worst("pd", k_p=800.0, k_d=60.0) < 0.5 * worst("pd")).all()
     nominal = gym.make("USM-Operation-v0").unwrapped.nominal
     idle = usm_baselines.make("pd", nominal, k_p=0.0, k_d=0.0, heading_gain=0.0)
-    observation = np.random.default_rng(0).normal(size=90).astype(np.float32)
+    observation = np.random.default_rng(0).normal(size=94).astype(np.float32)
     observation[-1] = 1.0  # the thruster limit
     np.testing.assert_array_equal(idle.predict(observation)[0], 0.0)
 

@@ -7,10 +7,12 @@ import pytest
 import usm_baselines
 from numpy.typing import NDArray
 from support import laws
+from support.episodes import HARDER
 from usm_baselines.laws import super_twisting
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 
-from usm_gym import Robot
+from usm_gym import Conditions, Robot
+from usm_gym.task.conditions import FIELD
 
 Array = NDArray[np.float64]
 
@@ -203,8 +205,10 @@ def test_alpha_falls_inside_the_dead_zone_as_fast_as_it_grows_in_the_law_of_shte
         },
     ],
 )
-@pytest.mark.parametrize("conditions", ["field", "rough"])
-def test_the_policy_is_that_of_plain_python(conditions: str, gains: dict[str, float]) -> None:
+@pytest.mark.parametrize("conditions", [FIELD, HARDER], ids=["field", "harder"])
+def test_the_policy_is_that_of_plain_python(
+    conditions: Conditions, gains: dict[str, float]
+) -> None:
     env = gym.make("USM-Operation-v0", conditions=conditions)
     robot = Robot()
     policy = usm_baselines.make("sta", env, **gains)

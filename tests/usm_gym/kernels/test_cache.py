@@ -33,7 +33,7 @@ from usm_gym.task.sampling import sample
 from usm_gym.simulation import Simulation
 draw = np.random.default_rng(0)
 for size in (1, 3):
-    scenarios = [sample("operation", PRESETS["rough"], draw) for _ in range(size)]
+    scenarios = [sample("operation", PRESETS["sea"], draw) for _ in range(size)]
     fleet = Simulation(scenarios)
     for _ in range(100):
         fleet.step(draw.uniform(-1, 1, (size, 5)).astype(np.float32))
@@ -92,8 +92,12 @@ from usm_baselines.laws.pd import PDGains, pd
 from usm_baselines.laws.pid import PIDGains, pid
 from usm_baselines.signals import Signals
 
-values = (np.full((1, 2), 0.1 * (k + 1)) for k in range(4))
-signals = Signals(np.ones(1), *values, np.zeros((1, 3, 3)), np.zeros((1, 1), np.float32))
+y, u, velocity, acceleration = (np.full((1, 2), 0.1 * (k + 1)) for k in range(4))
+none = np.zeros((1, 2))
+signals = Signals(
+    np.ones(1), np.ones(1, np.bool_), False, y, none, none, none, u, velocity, acceleration,
+    np.zeros((1, 3, 3)), np.zeros((1, 1), np.float32),
+)
 for law, arguments in ((pd, (PDGains(), 0)), (pid, (PIDGains(),))):
     state, force = np.full((1, 2, 4), 0.01), np.empty((1, 2))
     law(signals, 0.02, 10.0, *arguments, state, force)

@@ -141,3 +141,45 @@ def test_a_nan_before_settling_is_refused_all_the_same() -> None:
 def test_no_settled_time_at_all_is_refused() -> None:
     with pytest.raises(ValueError, match="shifts"):
         metrics.settled_error(TIME, errors(), (5.0, 12.0, 19.0, 26.0, 33.0, 34.0))
+
+
+def test_what_is_left_out_after_shifts_is_shorter_where_they_come_thick() -> None:
+    assert metrics.recovery_from((10.0, 16.0, 30.0)) == 7.0
+    assert metrics.recovery_from((10.0, 15.9, 30.0)) == 3.0
+    shifts = tuple(np.arange(5.0, 38.0, 4.0).tolist())
+    error = errors(1e-3, 2e-3)
+    for shift in shifts:
+        error[at(shift) : at(shift + 3.0)] = (0.5, 0.6)
+    assert metrics.settled_error(TIME, error, shifts, 5.0, 3.0).tolist() == [1e-3, 2e-3]
+    assert metrics.settled_error(TIME, error, shifts, 5.0, 2.9).tolist() == [0.5, 0.6]
+
+
+def test_each_shift_has_the_largest_error_up_to_the_next_one() -> None:
+    shifts = (4.5, 9.28, 20.0, 39.98)
+    error, expected = errors(1e-4, -1e-4), []
+    error[: at(4.5)] = 9.0  # before the first one
+    for k, (first, last) in enumerate(zip(shifts, (*shifts[1:], 40.02), strict=True)):
+        size = 0.1 * (k + 1)
+        # At its first and its last instant, of either sign.
+        error[at(first), 0], error[at(last) - 1, 1] = -size, 2 * size
+        expected.append([size, 2 * size])
+    np.testing.assert_array_equal(metrics.shift_errors(TIME, error, shifts), expected)
+    assert metrics.shift_errors(TIME, error, ()).shape == (0, 2)
+    # A shift between two instants is felt at the next one.
+    between = metrics.shift_errors(TIME, error, (4.49, 9.27, 19.99, 39.97))
+    np.testing.assert_array_equal(between, expected)
+
+
+def test_the_largest_error_of_all_shifts_is_the_maximum_after_the_first() -> None:
+    error = np.random.default_rng(0).normal(size=(TIME.size, 3))
+    by_shift = metrics.shift_errors(TIME, error, (7.0, 12.0, 12.5, 33.3))
+    assert by_shift.shape == (4, 3)
+    np.testing.assert_array_equal(by_shift.max(axis=0), metrics.max_error(TIME, error, 7.0))
+
+
+def test_a_shift_after_the_end_has_no_error() -> None:
+    for shifts in ((40.5,), (10.0, 41.0)):
+        with pytest.raises(ValueError, match=r"shifts is .*; allowed: times up to 40.0 s"):
+            metrics.shift_errors(TIME, errors(), shifts)
+    with pytest.raises(ValueError, match="error"):
+        metrics.shift_errors(TIME, errors(np.nan), (10.0,))

@@ -14,7 +14,9 @@ from usm_gym.robot import Robot, Thruster
 from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import named, sample
-from usm_gym.task.scenario import MODES, NOISE, WATER, Mode
+from usm_gym.task.scenario import MODES, Mode
+from usm_gym.task.sensing import POSITION
+from usm_gym.task.water import WATER
 
 Array = NDArray[np.float64]
 
@@ -109,8 +111,8 @@ def test_fields_left_out_have_their_defaults() -> None:
         ({"inspection": {"times": [20.0, 10.0, 30.0]}}, ["times", "20.0"]),
         ({"inspection": {"filter_frequency": 0.0}}, ["filter_frequency"]),
         (
-            {"inspection": {"times": list(range(9)), "deflections": [0.0] * 9}},
-            ["times", "8"],
+            {"inspection": {"times": list(range(17)), "deflections": [0.0] * 17}},
+            ["times", "16"],
         ),
         ({"conditions": {"motion": "on"}}, ["conditions", "motion"]),
         ({"conditions": {"integrator": "rk4"}}, ["integrator", "rk4", "explicit"]),
@@ -122,6 +124,17 @@ def test_fields_left_out_have_their_defaults() -> None:
         ({"water": {"coefficients": [1.0] * 5}}, ["water", "coefficients"]),
         ({"water": {"period": 0.0}}, ["water", "period"]),
         ({"water": {"current": [0.0, None]}}, ["water", "current"]),
+        ({"water": {"waves": [{"amplitude": [0.1, 0.0], "phase": 0.0}]}}, ["waves", "period"]),
+        (
+            {"water": {"waves": [{"amplitude": [9, 0], "phase": 0, "period": 5}]}},
+            ["waves", "amplitude", "less than or equal to 5"],
+        ),
+        (
+            {"water": {"waves": [{"amplitude": [0, 0], "phase": 0, "period": 5}] * 5}},
+            ["waves", "4"],
+        ),
+        ({"water": {"link_factors": [0.0] * 16}}, ["link_factors", "0.01"]),
+        ({"thruster_gains": [101.0] * 5}, ["thruster_gains", "100"]),
     ],
 )
 def test_what_is_wrong_is_named(fields: dict[str, Any], names: list[str]) -> None:
@@ -157,23 +170,20 @@ def test_named_scenarios(mode: Mode) -> None:
         assert table1.inspection.filter_frequency is None
     assert nominal.conditions == PRESETS["field"]
     assert table1.conditions == PRESETS["ideal"]
-    assert named("nominal", mode, PRESETS["rough"]).conditions == PRESETS["rough"]
+    assert named("nominal", mode, PRESETS["sea"]).conditions == PRESETS["sea"]
     with pytest.raises(ValueError, match="nominal, table1"):
         named("table2", mode)
 
 
 @pytest.mark.parametrize(
-    ("preset", "deflections", "frequencies"),
-    [
-        ("ideal", (0.7, 1.75), (6, 12)),
-        ("field", (0.7, 1.75), (6, 12)),
-        ("rough", (0.9, 2.1), (8, 14)),
-    ],
+    ("deflections", "frequencies"), [((0.7, 1.75), (6.0, 12.0)), ((0.9, 2.1), (8.0, 14.0))]
 )
 def test_operation_is_drawn_from_its_ranges(
-    preset: str, deflections: tuple[float, float], frequencies: tuple[float, float]
+    deflections: tuple[float, float], frequencies: tuple[float, float]
 ) -> None:
-    scenarios = drawn("operation", preset)
+    random = np.random.default_rng(0)
+    conditions = Conditions(deflection_range=deflections, filter_range=frequencies)
+    scenarios = [sample("operation", conditions, random) for _ in range(DRAWS)]
     assert_fills([s.path.speed for s in scenarios], 0.0, 0.1)
     assert_fills([s.path.amplitude for s in scenarios], 0.0, 0.25)
     assert_fills([s.path.frequency for s in scenarios], 0.03, 0.15)
@@ -211,7 +221,7 @@ def test_torpedo_is_drawn_from_its_ranges() -> None:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize(
     ("preset", "current", "coefficients"),
-    [("field", 0.05, (0.8, 1.2)), ("rough", 0.1, (0.6, 1.5))],
+    [("field", 0.05, (0.8, 1.2)), ("sea", 0.15, (0.5, 2.0))],
 )
 def test_water_is_drawn_from_its_ranges(
     mode: Mode, preset: str, current: float, coefficients: tuple[float, float]
@@ -226,12 +236,41 @@ def test_water_is_drawn_from_its_ranges(
     correlation = np.corrcoef(np.column_stack([currents, ratios]).T)
     np.testing.assert_allclose(correlation, np.eye(8), atol=0.1)
     amplitudes = np.abs([w.amplitude for w in waters])
-    if preset == "rough":
-        assert_fills(amplitudes, 0.0, PRESETS["rough"].current_variation)
+    if preset == "sea":
+        assert_fills(amplitudes, 0.0, PRESETS["sea"].current_variation)
         assert_fills([w.period for w in waters], 10.0, 40.0)
         assert_fills([w.phase for w in waters], 0.0, 2 * np.pi)
     else:
         assert not amplitudes.any()
+
+
+@pytest.mark.parametrize("preset", ["basin", "sea"])
+def test_gains_and_factors_are_drawn_from_their_ranges_each_for_itself(preset: str) -> None:
+    scenarios, conditions = drawn("operation", preset), PRESETS[preset]
+    gains = np.array([s.thruster_gains for s in scenarios])
+    factors = np.array([s.water.link_factors for s in scenarios])
+    assert (gains.shape, factors.shape) == ((DRAWS, 5), (DRAWS, 16))
+    for gain in gains.T:
+        assert_fills(gain, *conditions.thruster_gain_range)
+    spread = conditions.coefficient_spread
+    for factor in factors.T:
+        assert_fills(factor, 1.0 - spread, 1.0 + spread)
+    ratios = np.array([s.water.coefficients for s in scenarios])
+    correlation = np.corrcoef(np.hstack([gains, factors, ratios]).T)
+    np.testing.assert_allclose(correlation, np.eye(27), atol=0.1)
+
+
+def test_waves_are_drawn_from_their_ranges_and_never_beyond_the_limit() -> None:
+    waters = [s.water for s in drawn("torpedo", "sea")]
+    limit = PRESETS["sea"].wave_limit
+    sizes = np.array([[np.hypot(*wave.amplitude) for wave in w.waves] for w in waters])
+    assert sizes.shape == (DRAWS, 4)
+    for size in sizes.T:
+        assert_fills(size, 0.0, limit / 4)
+    waves = [wave for w in waters for wave in w.waves]
+    assert_fills([wave.period for wave in waves], 4.0, 10.0)
+    assert_fills([wave.phase for wave in waves], 0.0, 2 * np.pi)
+    assert_fills([np.arctan2(*wave.amplitude) for wave in waves], -np.pi, np.pi)
 
 
 def test_ideal_water_is_still_and_as_in_the_book() -> None:
@@ -239,12 +278,14 @@ def test_ideal_water_is_still_and_as_in_the_book() -> None:
         assert not np.any(scenario.water.current)
         assert not np.any(scenario.water.amplitude)
         assert scenario.water.coefficients == (1.0,) * 6
-        assert not scenario.noise().any()
+        assert not scenario.sensing().position.any()
+        assert (scenario.water.waves, scenario.water.link_factors) == ((), ())
+        assert scenario.thruster_gains == ()
 
 
 def test_same_seed_same_scenario_and_no_two_seeds_alike() -> None:
     def first(*key: int) -> Scenario:
-        return sample("operation", PRESETS["rough"], stream(*key))
+        return sample("operation", PRESETS["sea"], stream(*key))
 
     assert first(3, EVALUATION, 7) == first(3, EVALUATION, 7)
     purposes = (SUITE, EVALUATION, TRAINING, TUNING, VALIDATION)
@@ -272,31 +313,15 @@ def test_unknown_mode_is_named() -> None:
         sample("diving", PRESETS["field"], np.random.default_rng(0))  # type: ignore[arg-type]
 
 
-def test_noise_has_the_size_of_the_conditions_and_no_memory() -> None:
-    scenario = drawn("operation", "rough", 1)[0]
-    noise = scenario.noise()
-    assert noise.shape == (2001, 2)  # the start is measured too
-    np.testing.assert_allclose(noise.std(axis=0), 2e-4, rtol=0.1)
-    np.testing.assert_allclose(noise.mean(axis=0), 0.0, atol=2e-5)
-    np.testing.assert_array_equal(noise, scenario.noise())
-    unit = noise.ravel() / 2e-4
-    assert abs(np.corrcoef(unit[:-1], unit[1:])[0, 1]) < 0.06
-    assert abs(np.corrcoef(unit[:-2], unit[2:])[0, 1]) < 0.06
-
-
 def test_noise_and_water_come_from_streams_of_their_own() -> None:
+    # Another length or level of noise leaves the water alone.
     field = drawn("operation", "field", 1)[0]
-    rough = field.under(PRESETS["rough"])
-    # Another water leaves the noise alone, and another length or level of noise the water.
-    np.testing.assert_allclose(rough.noise() / 2e-4, field.noise() / 5e-5, rtol=1e-12)
-    short = dataclasses.replace(field, duration=10.0)
-    np.testing.assert_array_equal(short.noise(), field.noise()[:501])
     louder = dataclasses.replace(PRESETS["field"], position_noise=1e-3)
     assert field.under(louder).water == field.water
-    keys = [(), (NOISE,), (WATER,)]
+    keys = [(), (POSITION,), (WATER,)]
     sequences = [np.random.SeedSequence(field.noise_seed, spawn_key=key) for key in keys]
     plain, noise, water = (np.random.default_rng(each).standard_normal(2) for each in sequences)
-    np.testing.assert_allclose(field.noise()[0], 5e-5 * noise)
+    np.testing.assert_allclose(field.sensing().position[0], 5e-5 * noise)
     assert len({*plain, *noise, *water}) == 6
 
 
@@ -309,15 +334,23 @@ def test_under_its_own_conditions_a_drawn_scenario_is_the_same(mode: Mode, prese
 
 def test_under_other_conditions_path_and_motion_are_the_same() -> None:
     for scenario in drawn("operation", "field", 20):
-        rough = scenario.under(PRESETS["rough"])
-        assert rough.conditions == PRESETS["rough"]
-        assert rough.water != scenario.water
+        sea, basin = scenario.under(PRESETS["sea"]), scenario.under(PRESETS["basin"])
+        assert sea.conditions == PRESETS["sea"]
+        assert sea.water != scenario.water
         # The water is stretched, not replaced.
-        np.testing.assert_allclose(rough.water.current, 2.0 * np.array(scenario.water.current))
+        np.testing.assert_allclose(sea.water.current, 3.0 * np.array(scenario.water.current))
         np.testing.assert_allclose(
-            (np.array(rough.water.coefficients) - 0.6) / 0.9,
+            (np.array(sea.water.coefficients) - 0.5) / 1.5,
             (np.array(scenario.water.coefficients) - 0.8) / 0.4,
             atol=1e-12,
         )
-        restored = dataclasses.replace(rough, conditions=scenario.conditions, water=scenario.water)
-        assert restored == scenario
+        # So are gains, factors and waves.
+        gains = (np.array(each.thruster_gains) - 1.0 for each in (sea, basin))
+        np.testing.assert_allclose(next(gains), 0.2 / 0.15 * next(gains), atol=1e-12)
+        factors = (np.array(each.water.link_factors) - 1.0 for each in (sea, basin))
+        np.testing.assert_allclose(next(factors), 0.25 / 0.15 * next(factors), atol=1e-12)
+        higher = scenario.under(dataclasses.replace(PRESETS["sea"], wave_limit=0.3))
+        for low, high in zip(sea.water.waves, higher.water.waves, strict=True):
+            assert (low.phase, low.period) == (high.phase, high.period)
+            np.testing.assert_allclose(high.amplitude, 3.0 * np.array(low.amplitude))
+        assert sea.under(PRESETS["field"]) == scenario

@@ -1,0 +1,94 @@
+"""The law of `joint_lqg`, told what is constant in an episode: what identification could bring.
+
+It measures what all measure. Beyond that it is told the true hydrodynamic coefficients, the gains
+of the thrusters and the mean current; not the part of the current that varies, and no waves.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS, Predictor
+from usm_baselines.laws.adaptive_lqg import compensated
+from usm_baselines.laws.joint_lqg import JointLQG
+from usm_baselines.signals import Array
+from usm_gym.simulation import Snapshot
+from usm_gym.support.validation import require
+from usm_gym.task.nominal import Nominal
+
+
+class Told(Predictor):
+    """A predictor that is told what the robots are.
+
+    Attributes:
+        truth: What they are, (batch, numbers), as beliefs.
+    """
+
+    truth: Array
+
+    def beliefs(self, state: Array) -> Array:
+        """What the robots of a batch are, (batch, numbers)."""
+        return self.truth
+
+    def tell(self, scenarios: tuple[Any, ...]) -> None:
+        """Take in what is constant in the episodes of a batch."""
+        self.truth = np.stack([self._constants(scenario) for scenario in scenarios])
+
+    def _constants(self, scenario: Any) -> Array:
+        belief, water = self._neutral.copy(), scenario.water
+        belief[:CURRENT] = water.coefficients
+        belief[CURRENT:THRUSTER_GAINS] = water.current
+        factors = THRUSTER_GAINS + self._thrusters
+        belief[THRUSTER_GAINS:factors] = scenario.thruster_gains or 1.0
+        belief[factors:] = water.link_factors or 1.0
+        return belief
+
+
+class InformedLQG(JointLQG):
+    """LQG control that is told what no controller can measure: no competitor."""
+
+    privileged = True
+
+    def __init__(self, nominal: Nominal, **gains: Any) -> None:
+        """Compute the gains of filter and regulator; gains other than the defaults by name."""
+        super().__init__(nominal, **gains)
+        self._scenarios: tuple[Any, ...] = ()
+
+    def _make_predictor(self, nominal: Nominal) -> Told:
+        self._told = Told(nominal, *self.densities)
+        return self._told
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Array | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+        *,
+        snapshot: Snapshot | None = None,
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Act as `ScriptedPolicy.predict`, knowing what is constant in the episodes.
+
+        Args:
+            observation: Observations, (batch, numbers).
+            state: What the last call returned; None at the start.
+            episode_start: Where an episode starts.
+            deterministic: Without effect.
+            snapshot: The true state of the simulation that is observed, of which only the constants
+                of its scenarios are read.
+
+        Raises:
+            ValueError: If there is no snapshot.
+        """
+        require(isinstance(snapshot, Snapshot), "snapshot", snapshot, "the true state")
+        assert snapshot is not None
+        if snapshot.scenarios != self._scenarios:
+            self._scenarios = snapshot.scenarios
+            self._told.tell(snapshot.scenarios)
+        return super().predict(observation, state, episode_start, deterministic)
+
+    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
+        return compensated(super()._act(observation, state), self._told.truth)

@@ -1,0 +1,36 @@
+"""Which policies are meant for which conditions."""
+
+from __future__ import annotations
+
+from usm_baselines.registry import Registration, entry, ids
+from usm_gym.task.conditions import Conditions, preset_of
+
+# Presets for which laws are tuned anew. To all other conditions go the policies that are meant for
+# `field`.
+TIERS = ("basin", "sea")
+# The policies with the paper's gains, which meet all conditions.
+PAPER = ("sta", "pd")
+
+
+def tier_of(conditions: Conditions) -> str:
+    """The preset whose policies meet some conditions: one of `TIERS`, or "field"."""
+    preset = preset_of(conditions)
+    return preset if preset in TIERS else "field"
+
+
+def meant_for(conditions: Conditions) -> list[str]:
+    """Names of the policies that are meant for some conditions.
+
+    For a tier they are those whose gains are tuned for it, the paper's two, and those that are
+    given true state and not tuned for anything else; for all other conditions all but those that
+    are tuned for a tier.
+    """
+    tier = tier_of(conditions)
+
+    def meant(id: str, policy: Registration) -> bool:
+        if tier not in TIERS:
+            return policy.tuned_for not in TIERS
+        unbound = id in PAPER or (policy.privileged and not policy.tuned_for)
+        return policy.tuned_for == tier or unbound
+
+    return [id for id in ids() if meant(id, entry(id))]

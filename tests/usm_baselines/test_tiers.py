@@ -1,0 +1,61 @@
+"""Policies with gains for a tier are there, and are scored where they are meant to be."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.tiers import TIERS, gains_file, register_with_tiers
+from usm_baselines import registry
+from usm_baselines.contender import contender
+from usm_baselines.gains import FOLDERS
+from usm_baselines.tiers import PAPER, meant_for, tier_of
+
+from usm_gym.support.validation import UsageError
+from usm_gym.task.conditions import PRESETS, Conditions
+from usm_gym.task.sampling import named
+
+
+@pytest.fixture(autouse=True)
+def _tiers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    register_with_tiers(monkeypatch, tmp_path, "mine")
+
+
+def test_gains_of_every_tier_are_registered_under_its_name() -> None:
+    nominal = named("nominal", "operation").nominal
+    assert registry.ids()[-4:] == ["mine", "mine-tuned", "mine-basin", "mine-sea"]
+    for gain, (suffix, tier) in enumerate(zip(FOLDERS, TIERS, strict=True), start=1):
+        policy: Any = registry.make(f"mine-{suffix}", nominal)
+        assert policy.gains.k_p == gain
+        assert registry.entry(f"mine-{suffix}").tuned_for == tier
+        assert contender(f"mine-{suffix}").tuned_for == tier
+    assert registry.entry("mine").tuned_for == contender("mine").tuned_for == ""
+
+
+def test_a_file_says_for_what_its_gains_are_tuned(tmp_path: Path) -> None:
+    for tier in ("basin", None):
+        file = gains_file(tmp_path / "own.json", "mine", tier, k_p=1.0)
+        assert contender(f"mine@{file}").tuned_for == (tier or "")
+    file.write_text(file.read_text()[:-1] + ', "conditions": {"position_period": 0}}')
+    with pytest.raises(UsageError, match="position_period is 0"):
+        contender(f"mine@{file}")
+
+
+def test_a_tier_is_for_its_own_policies_the_papers_and_those_that_see_the_truth() -> None:
+    for tier in ("basin", "sea"):
+        chosen = meant_for(PRESETS[tier])
+        assert {*PAPER, "oracle", f"mine-{tier}"} <= set(chosen)
+        assert not {"mine", "mine-tuned", "zero", "pid", "pid-tuned"} & set(chosen)
+        assert all(
+            registry.entry(id).tuned_for == tier or registry.entry(id).privileged or id in PAPER
+            for id in chosen
+        )
+
+
+@pytest.mark.parametrize(
+    "conditions", [PRESETS["field"], PRESETS["ideal"], Conditions(thruster_limit=9.0)]
+)
+def test_all_other_conditions_are_for_all_but_policies_of_tiers(conditions: Conditions) -> None:
+    assert tier_of(conditions) == "field"
+    left_out = [id for id in registry.ids() if id not in meant_for(conditions)]
+    assert all(registry.entry(id).tuned_for in ("basin", "sea") for id in left_out)
+    assert {"mine-basin", "mine-sea"} <= set(left_out)

@@ -1,0 +1,68 @@
+"""By default, conditions of a tier bring their own suite and the policies that are meant for it."""
+
+import json
+
+import pytest
+from rich.console import Console
+from support.tiers import register_with_tiers
+
+from usm_cli import selection
+from usm_cli.commands import evaluate, policies
+from usm_cli.program import main
+from usm_gym.suites import suite
+
+
+@pytest.fixture
+def chosen(tmp_path, monkeypatch):
+    """Return what an evaluation of a scenario of the chosen suite writes; the laws are made up."""
+    register_with_tiers(monkeypatch, tmp_path, "mine")
+    monkeypatch.setattr(selection, "suite", lambda name: suite(name)[:1])
+    output = tmp_path / "result.json"
+
+    def evaluated(*arguments):
+        main(["evaluate", *arguments, "--output", str(output)])
+        return json.loads(output.read_text())
+
+    return evaluated
+
+
+def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys):
+    data = chosen("--conditions", "basin")
+    assert (data["suite"], data["conditions_override"]) == ("operation-basin", "basin")
+    assert data["scenarios"] == [suite("operation-basin")[0].to_dict()]
+    assert set(data["results"]) == {"sta", "pd", "mine-basin"}
+    assert chosen("--suite", "operation-basin")["results"] == data["results"]
+    row = data["results"]["mine-basin"]
+    assert row["tuned_for"] == "basin"
+    assert "tuned_for" not in data["results"]["sta"]
+    episode = row["per_episode"]["last_shift_error_y"]
+    assert row["last_shift_error_y"]["mean"] == row["last_shift_error_y"]["median"] == episode[0]
+    said = capsys.readouterr().out
+    assert "median" in said
+    assert "fifth" in said
+
+
+def test_tables_of_scans_are_readable_on_120_columns(chosen, tmp_path):
+    chosen("--suite", "operation-basin", "--policies", "residual-lqg-joints,mine-basin")
+    result = evaluate.EvaluationResult.read(tmp_path / "result.json")
+    for table in (evaluate.table(result), evaluate.shift_table(result)):
+        console = Console(width=120, highlight=False)
+        with console.capture() as capture:
+            console.print(table)
+        assert "residual-lqg-joints" in capture.get()
+        assert "…" not in capture.get()
+
+
+def test_a_suite_of_ones_own_choice_keeps_its_joint_motion(chosen):
+    options = ("--policies", "zero", "--suite", "torpedo", "--conditions", "sea")
+    assert chosen(*options)["suite"] == "torpedo"
+    assert chosen("--policies", "zero", "--conditions", "ideal")["suite"] == "operation"
+
+
+def test_the_list_of_policies_says_for_what_they_are_tuned(tmp_path, monkeypatch, capsys):
+    register_with_tiers(monkeypatch, tmp_path, "mine")
+    monkeypatch.setattr(policies, "output_console", lambda: Console(width=200))
+    main(["policies"])
+    lines = {line.split()[0]: line.split()[-1] for line in capsys.readouterr().out.splitlines()}
+    found = [lines[f"mine-{gains}"] for gains in ("tuned", "basin", "sea")]
+    assert found == ["field", "basin", "sea"]
