@@ -8,6 +8,7 @@ import figures
 import usm_baselines
 from mkdocs.exceptions import PluginError
 from usm_baselines.benchmark.leaderboard import LeaderboardResult
+from usm_baselines.gains import FOLDERS
 from usm_baselines.registry import entry
 from usm_baselines.space import declared
 
@@ -47,12 +48,13 @@ def law(ids, everyone):
 
 
 def shipped(ids):
-    """Policies, followed by their tuned form if there is one."""
+    """Policies, each followed by the forms of it that are tuned."""
     known = usm_baselines.ids()
     for id in ids:
         if id not in known:
             raise PluginError(f"law is {id}; allowed: {', '.join(known)}")
-    return [name for id in ids for name in (id, f"{id}-tuned") if name in known]
+    gains = ("", *(f"-{suffix}" for suffix in FOLDERS))
+    return [id + kind for id in ids for kind in gains if id + kind in known]
 
 
 def gains(ids):
