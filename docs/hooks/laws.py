@@ -92,11 +92,17 @@ def scores(ids):
         "|---|" + "---:|" * (len(SHOWN) + 1),
     ]
     for id in ids:
-        rows = [board.suites[suite][id] for suite in SHOWN]
-        cells = [" / ".join(mm(error.mean) for error in score.errors.values()) for score in rows]
-        variation = rows[0].metrics["thrust_variation"].mean
-        lines.append(row(f"`{id}`", *cells, in_figures(variation)))
+        rows = [board.suites[suite].get(id) for suite in SHOWN]
+        scored = [score for score in rows if score is not None]
+        if scored:
+            variation = in_figures(scored[0].metrics["thrust_variation"].mean)
+            lines.append(row(f"`{id}`", *map(errors, rows), variation))
     return "\n".join(lines)
+
+
+def errors(score):
+    """Mean errors of a row of the leaderboard, if the policy is meant for the suite."""
+    return "" if score is None else " / ".join(mm(error.mean) for error in score.errors.values())
 
 
 @cache
