@@ -134,9 +134,10 @@ def tuned(file: GainsFile) -> Registration:
     """
     base, budget = entry(file.policy), file.budget
     _require_gains(file, base.factory)
+    tier = f" for {file.tuned_for}" if file.tuned_for else ""
     return Registration(
         partial(base.factory, **file.gains),
-        f"{file.policy}, tuned in {budget.trials} trials of {budget.episodes} episodes",
+        f"{file.policy}, tuned{tier} in {budget.trials} trials of {budget.episodes} episodes",
         told=base.told,
         privileged=base.privileged,
         note=base.note,

@@ -23,11 +23,11 @@ def add_to(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Print the table."""
-    table = Table("policy", "what it is", "told", "tuned for", box=None)
+    table = Table("policy", "what it is", "told", box=None)
     for id in ids():
         policy = entry(id)
         marks = [mark for mark in ("on_request", "privileged") if getattr(policy, mark)]
         said = [mark.replace("_", " ") for mark in marks] + [policy.note] * bool(policy.note)
         summary = policy.summary + "".join(f" ({each})" for each in said)
-        table.add_row(id, summary, policy.told, policy.tuned_for)
+        table.add_row(id, summary, policy.told)
     output_console().print(table)

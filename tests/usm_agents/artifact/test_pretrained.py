@@ -39,8 +39,7 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]
 
 
-def test_an_agent_of_an_older_plant_is_listed_as_one(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "400")
+def test_an_agent_of_an_older_plant_is_listed_as_one(capsys):
     main(["policies"])
     listed = " ".join(capsys.readouterr().out.split())
     for folder in SHIPPED:
