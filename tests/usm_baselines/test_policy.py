@@ -18,7 +18,7 @@ from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
 
-from tests.support.laws import made_signals
+from tests.support.signals import made_signals
 from usm_gym import Robot
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.observation import ObservationLayout

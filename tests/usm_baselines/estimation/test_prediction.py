@@ -8,7 +8,7 @@ import usm_baselines
 from usm_baselines.estimation.prediction import Predictor
 from usm_baselines.signals import Signals
 
-from tests.support.laws import made_signals
+from tests.support.signals import made_signals
 from usm_gym import Robot, Scenario, evaluate
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from usm_baselines.estimation import kalman
 from usm_baselines.laws.lqg import LQG, regulate, regulator_gain
 
-from tests.support.laws import made_signals
+from tests.support.signals import made_signals
 from usm_gym import Robot
 from usm_gym.task.nominal import Nominal
 
