@@ -9,6 +9,7 @@ import pytest
 import usm_baselines
 from numpy.typing import NDArray
 from support import laws
+from support.episodes import HARDER
 from usm_baselines.laws import pd
 from usm_baselines.laws.pd import FORCE, MASS, OBSERVER, PDGains
 
@@ -67,7 +68,7 @@ def test_the_force_is_that_of_the_reading(reading: int) -> None:
 @pytest.mark.parametrize("gains", [{}, {"k_p": 90.0, "k_d": 20.0, "surface": 2.0}])
 @pytest.mark.parametrize("id", READINGS)
 def test_the_policy_is_that_of_plain_python(id: str, gains: dict[str, float]) -> None:
-    env = gym.make("USM-Torpedo-v0", conditions="basin")
+    env = gym.make("USM-Torpedo-v0", conditions=HARDER)
     robot = Robot()
     policy = usm_baselines.make(id, env, **gains)
     observation, _ = env.reset(seed=5)
