@@ -27,7 +27,7 @@ def test_a_double_integrator_is_brought_to_rest_under_a_constant_push() -> None:
         "smc", NOMINAL, observer_gain=20.0, eta=2.0, boundary=0.1, surface=3.0
     )
     observation = np.zeros(94, np.float32)
-    observation[-1] = 5.0  # 100 N
+    observation[88] = 5.0  # 100 N
     h, mass, limit = 0.02, NOMINAL.robot.total_mass, 100.0
     x, v, state, surfaces = 0.02, 0.0, None, []
     for _ in range(500):
