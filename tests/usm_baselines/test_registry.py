@@ -157,6 +157,6 @@ def test_gains_are_taken(id: str) -> None:
     default: Any = usm_baselines.make(id, nominal)
     assert given.gains == default.gains._replace(heading_gain=1.0, observer_gain=20.0)
     observation = np.zeros(94, np.float32)
-    observation[-1], observation[-7] = 1.0, 2.0  # thruster limit, heading error
+    observation[89], observation[83] = 1.0, 2.0  # thruster limit, heading error
     moments = [policy.predict(observation)[0][1:] for policy in (given, default)]
     np.testing.assert_allclose(moments[1], 100.0 * moments[0], rtol=1e-5)

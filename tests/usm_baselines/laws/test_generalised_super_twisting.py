@@ -82,7 +82,7 @@ def test_constant_gains_are_adaptive_ones_that_keep_still() -> None:
         "agsta", NOMINAL, linear=3.0, epsilon=0.0, beta_offset=0.2, omega=0.0, alpha_start=0.7
     )
     observation = np.zeros((1, 94), np.float32)
-    observation[:, -1] = 1.0
+    observation[:, 89] = 1.0  # the thruster limit
     one = other = None
     for y in np.random.default_rng(0).normal(0.0, 0.1, 20):
         observation[:, :2] = y

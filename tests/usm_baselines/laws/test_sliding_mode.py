@@ -8,8 +8,10 @@ from usm_baselines.laws import sliding_mode
 
 from usm_gym import Robot
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.observation import ObservationLayout
 
 NOMINAL = Nominal(Robot(), 0.02, 0.0, 0.0)
+LAYOUT = ObservationLayout(16, 5)
 
 
 @numba.njit
@@ -26,15 +28,15 @@ def test_a_double_integrator_is_brought_to_rest_under_a_constant_push() -> None:
     policy = usm_baselines.make(
         "smc", NOMINAL, observer_gain=20.0, eta=2.0, boundary=0.1, surface=3.0
     )
-    observation = np.zeros(94, np.float32)
-    observation[88] = 5.0  # 100 N
+    observation = np.zeros(LAYOUT.size, np.float32)
+    observation[LAYOUT.slices["thruster_limit"]] = 5.0  # 100 N
     h, mass, limit = 0.02, NOMINAL.robot.total_mass, 100.0
     x, v, state, surfaces = 0.02, 0.0, None, []
     for _ in range(500):
         observation[0] = x / 0.01
         action, state = policy.predict(observation, state)
         a = float(action[0]) * limit / mass + 0.5
-        observation[83:88] = np.clip(action, -1.0, 1.0)
+        observation[LAYOUT.slices["thruster_command"]] = np.clip(action, -1.0, 1.0)
         x, v = x + h * v + 0.5 * h * h * a, v + h * a
         kept = {name: numbers[0, 0] for name, numbers in policy.state_of(state).items()}
         surfaces.append(kept["rate"] + 6.0 * kept["error"] + 9.0 * kept["integral"])
