@@ -37,9 +37,14 @@ def test_every_law_was_tuned_as_long_as_every_other_and_for_the_same(tier) -> No
     assert len({json.dumps({name: each[name] for name in kept}) for each in said}) <= 1
 
 
+# Laws for conditions in which positions are late or rare, or the robot is unknown.
+BEYOND_FIELD = {"sta-navigator", "pd-navigator", "pid-navigator", "smc-navigator"}
+BEYOND_FIELD |= {"adaptive", "informed"}
+
+
 def test_every_law_has_shipped_gains() -> None:
     laws = {id for id in registry.ids() if registry.entry(id).space}
-    assert {file.stem for file in gains.TUNED.glob("*.json")} == laws
+    assert {file.stem for file in gains.TUNED.glob("*.json")} == laws - BEYOND_FIELD
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parent.name}-{file.stem}")

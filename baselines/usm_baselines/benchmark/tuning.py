@@ -59,6 +59,8 @@ FAILED = 1e4
 # Objectives that are this close to the best are as good; of these trials the one is taken whose
 # gains are nearest to the middle of their ranges.
 AS_GOOD = 0.01
+# Nearer to an end of its range than this share of it, a gain is not taken: the range chose it.
+END = 0.05
 # The attribute of a trial that says why it has no score.
 REFUSED = "refused"
 
@@ -287,15 +289,16 @@ def _scored(
 
 
 def _chosen(study: Study, problem: Problem) -> FrozenTrial:
-    """The trial that is taken, of those that are as good as the best."""
+    """The trial that is taken, of those that are as good as the best away from all ends."""
     trials = study.get_trials(deepcopy=False)[: problem.budget.trials]
-    limit = (1.0 + AS_GOOD) * min(map(value_of, trials))
 
     def distance(trial: FrozenTrial) -> float:
         spans = problem.space.items()
         return max(abs(span.place(trial.params[name]) - 0.5) for name, span in spans)
 
-    return min((trial for trial in trials if value_of(trial) <= limit), key=distance)
+    inside = [trial for trial in trials if distance(trial) <= 0.5 - END] or trials
+    limit = (1.0 + AS_GOOD) * min(map(value_of, inside))
+    return min((trial for trial in inside if value_of(trial) <= limit), key=distance)
 
 
 def value_of(trial: FrozenTrial) -> float:

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from optuna.distributions import FloatDistribution
+from optuna.trial import create_trial
 
 pytest.importorskip("optuna", reason="the extra `tune` is not installed")
 
@@ -285,3 +287,27 @@ def test_a_password_is_not_said() -> None:
     with pytest.raises(ValueError, match="storage") as caught:
         tune(problem(), "nonsense://me:secret@host/trials")
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("values", "taken"), [((1.0, 1.005, 2.0), 1), ((1.0, 1.02, 2.0), 0)])
+def test_of_trials_that_are_as_good_the_most_central_is_taken(values, taken) -> None:
+    assert chosen([0.9, 0.6, 0.5], values) == taken
+
+
+def test_gains_near_an_end_are_taken_only_if_there_are_no_others() -> None:
+    assert chosen([0.97, 0.9, 0.5], (1.0, 1.5, 2.0)) == 1
+    assert chosen([0.97, 0.02, 0.96], (1.0, 1.5, 2.0)) == 0
+
+
+def chosen(places: list[float], values: tuple[float, ...]) -> int:
+    """Which of some trials is taken, whose gains lie at some places of their ranges."""
+    asked = problem(budget=Budget(len(places), 1))
+    study = optuna.create_study()
+    for place, value in zip(places, values, strict=True):
+        gains = {name: span.at(place) for name, span in asked.space.items()}
+        spans = {
+            name: FloatDistribution(span.low, span.high, log=span.log)
+            for name, span in asked.space.items()
+        }
+        study.add_trial(create_trial(params=gains, distributions=spans, value=value))
+    return tuning._chosen(study, asked).number
