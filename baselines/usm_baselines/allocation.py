@@ -25,9 +25,11 @@ from usm_baselines.signals import Array
 PSEUDO_INVERSE, QUADRATIC_PROGRAM = "pseudo-inverse", "quadratic program"
 ALLOCATIONS = PSEUDO_INVERSE, QUADRATIC_PROGRAM
 # Forces, N, that are as bad as a moment that is wrong by 1 N m, and as 1 N of a thruster.
-MOMENT_WEIGHT, EFFORT_WEIGHT = 0.05, 1e-3
+MOMENT_WEIGHT, EFFORT_WEIGHT = 0.2, 0.05
 # A state of one number in each axis, which stays zero.
 NO_STATE = np.zeros((AXES, AXES))
+# By how much more than the dead-band a command is, so that it still is as a number of 32 bits.
+MARGIN = 1.0 + 1e-6
 PROBLEM = Problem(NO_STATE, NO_STATE, np.ones(AXES), 1.0, MOMENT_WEIGHT, EFFORT_WEIGHT)
 
 
@@ -61,7 +63,7 @@ def nearest(wanted: Array, limit: Array, allocation: Array) -> Array:
 def outside(command: Array, dead_band: float) -> Array:
     """Commands with those below the dead-band made none, or the least that makes a force."""
     size = np.abs(command)
-    least = np.where(size < 0.5 * dead_band, 0.0, dead_band)
+    least = np.where(size < 0.5 * dead_band, 0.0, MARGIN * dead_band)
     return np.where(size < dead_band, np.copysign(least, command), command)
 
 

@@ -63,17 +63,17 @@ def test_within_the_limits_nothing_changes_and_robots_are_alone() -> None:
 def test_commands_keep_out_of_the_dead_band() -> None:
     asked = np.array([[0.0, 0.1, -0.1, 0.16, -0.29, 0.3, -5.0]])
     expected = np.array([[0.0, 0.0, 0.0, 0.3, -0.3, 0.3, -5.0]])
-    assert np.array_equal(outside(asked, 0.3), expected)
+    np.testing.assert_allclose(outside(asked, 0.3), expected, rtol=2e-6)
     assert np.array_equal(outside(asked, 0.0), asked)
 
 
-def test_actions_are_within_the_limits() -> None:
-    wanted, limit, allocation = problems(3, 20)
+def test_actions_are_within_the_limits_and_outside_the_dead_band() -> None:
+    wanted, limit, allocation = problems(3, 200)
     action = within((wanted / 8.0).astype(np.float32), limit, 0.3, allocation)
     assert action.dtype == np.float32
     assert np.abs(action).max() <= 1.0
-    size = np.abs(action)
-    assert ((size == 0.0) | (size >= np.float32(0.3 / 8.0))).all()
+    force = np.abs(action.astype(np.float64)) * 8.0
+    assert ((force == 0.0) | (force >= 0.3)).all()
 
 
 def test_every_law_can_have_it_and_another_word_is_refused() -> None:

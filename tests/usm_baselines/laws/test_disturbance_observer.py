@@ -8,8 +8,10 @@ from usm_baselines.estimation import kalman
 from usm_baselines.laws.disturbance_observer import q_gain, rate_gain
 from usm_baselines.signals import Signals
 
-from usm_gym import Robot
+from usm_gym import Robot, evaluate
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.sampling import sample
 
 Array = NDArray[np.float64]
 H, LAG, DAMPING = 0.02, 0.05, 0.4
@@ -104,3 +106,13 @@ def test_a_constant_disturbance_moves_nothing_in_the_end_and_the_loop_has_its_po
     late = (times > 3.0) & (times < 5.0)
     slope = np.polyfit(times[late], np.log(np.abs(np.array(errors)[late]) / times[late]), 1)[0]
     assert slope == pytest.approx(-2.0, rel=0.1)
+
+
+@pytest.mark.parametrize("preset", ["field", "basin"])
+def test_it_brings_the_robot_home(preset: str) -> None:
+    draws = map(np.random.default_rng, range(2))
+    scenarios = [sample("operation", PRESETS[preset], stream) for stream in draws]
+    outcome = evaluate(usm_baselines.make("dob", scenarios[0].nominal), scenarios)
+    assert not outcome.failed.any()
+    for axis in "xy":
+        assert outcome.per_episode[f"max_error_{axis}"].max() < 0.2

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 from usm_baselines.laws import incremental
 from usm_baselines.signals import Signals
 
-from usm_gym import Robot
+from usm_gym import Robot, evaluate
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.sampling import sample
 
 Array = NDArray[np.float64]
 H = 0.005
@@ -89,3 +91,13 @@ def test_acceleration_and_force_are_filtered_alike() -> None:
         gaps.append(state[incremental.ACCELERATION] - state[incremental.THRUST_SHARE])
     assert np.abs(gaps).max() < 1e-9
     assert abs(state[incremental.THRUST_SHARE]) > 1e-3
+
+
+@pytest.mark.parametrize("preset", ["field", "basin"])
+def test_it_brings_the_robot_home(preset: str) -> None:
+    draws = map(np.random.default_rng, range(2))
+    scenarios = [sample("operation", PRESETS[preset], stream) for stream in draws]
+    outcome = evaluate(usm_baselines.make("indi", scenarios[0].nominal), scenarios)
+    assert not outcome.failed.any()
+    for axis in "xy":
+        assert outcome.per_episode[f"max_error_{axis}"].max() < 0.2
