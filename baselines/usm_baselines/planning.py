@@ -3,10 +3,11 @@
 Of a plan it is known what comes of it. What changes of its commands add to that is taken from the
 linear model of the straight body (`kalman`). They minimise, summed over the periods,
 
-    |error|^2 + variation^2 |force - thrust|^2 + moment^2 (moment - wanted)^2 + effort^2 |u|^2,
+    |error|^2 + variation^2 |force - held|^2 + moment^2 (moment - wanted)^2 + effort^2 |u|^2,
 
-where the commands u, each within its limits, make the force and the moment, and the thrust is what
-the force lags behind to. If no limit is met this is one Newton step, from a Riccati recursion over
+where the commands u, each within its limits, make the force and the moment. What the force is held
+to is up to the problem: the thrust, which lags behind it, or the force of the period before. If no
+limit is met this is one Newton step, from a Riccati recursion over
 the horizon. Else a primal-dual interior-point method takes several, each of them the same recursion
 with a term for every limit.
 
@@ -24,9 +25,9 @@ from usm_baselines.estimation.kalman import COMMAND, ERROR, RATE, THRUST
 from usm_baselines.signals import Array
 from usm_gym.kernels.compile import compiled, piece
 
-# Axes, and numbers of the state: error, its rate and thrust over inertia of each axis.
-AXES, PER_AXIS = 2, 3
-NUMBERS = AXES * PER_AXIS
+# Axes. The state has as many numbers of each: the error first, and last what the commanded force is
+# held to, over the inertia.
+AXES = 2
 # The interior-point method: how far inside the limits it begins, over the limit; its steps; how far
 # each of them may go towards the limits; by what it is to bring complementarity down.
 INSIDE, STEPS, REACH, SHRINKING = 0.1, 14, 0.99, 0.15
@@ -38,10 +39,10 @@ class Problem(NamedTuple):
     """What the plans of all robots share.
 
     Attributes:
-        transition: Of the state over a period, (6, 6).
-        input: What a force of 1 N commanded along an axis adds to it, (6, 2).
+        transition: Of the state over a period, (numbers, numbers).
+        input: What a force of 1 N commanded along an axis adds to it, (numbers, 2).
         inertia: Inertia of the axes, kg, (2,).
-        variation: Error that is as bad as 1 N between force and thrust along an axis, m/N.
+        variation: Error that is as bad as 1 N between the force and what it is held to, m/N.
         moment: Error that is as bad as a moment that is wrong by 1 N m, m/(N m).
         effort: Error that is as bad as 1 N of a thruster, m/N.
     """
@@ -59,13 +60,13 @@ class Foreseen(NamedTuple):
 
     Attributes:
         error: Position errors at the end, m, (batch, periods, 2).
-        thrust: Forces that the thrusters make along the axes at the beginning, N, the same shape.
+        held: Forces along the axes that the commanded ones are held to, N, the same shape.
         wanted: Wanted moments, N m, (batch, periods).
         allocation: Allocation matrices, (batch, periods, 3, thrusters).
     """
 
     error: Array
-    thrust: Array
+    held: Array
     wanted: Array
     allocation: Array
 
@@ -74,10 +75,10 @@ class Room(NamedTuple):
     """Where the plan of one robot is worked on.
 
     Attributes:
-        gain: Change of the commands over change of the state, (periods, thrusters, 6).
+        gain: Change of the commands over change of the state, (periods, thrusters, numbers).
         change: Change of the commands, N, (periods, thrusters).
         error: What that changes of the errors, m, (periods, 2).
-        thrust: What it changes of the thrust, N, (periods, 2).
+        held: What it changes of the forces that they are held to, N, (periods, 2).
         curvature: Second derivatives that the limits add, (periods, thrusters).
         slope: First derivatives that they add, (periods, thrusters).
         low: Multipliers of the lower limits, (periods, thrusters).
@@ -87,7 +88,7 @@ class Room(NamedTuple):
     gain: Array
     change: Array
     error: Array
-    thrust: Array
+    held: Array
     curvature: Array
     slope: Array
     low: Array
@@ -95,15 +96,34 @@ class Room(NamedTuple):
 
 
 def problem_of(
-    transition: Array, inertia: Array, variation: float, moment: float, effort: float
+    transition: Array,
+    inertia: Array,
+    variation: float,
+    moment: float,
+    effort: float,
+    *,
+    changes: bool = False,
 ) -> Problem:
-    """The problem of a robot whose axes have these transitions, see `kalman`, (2, 4, 6)."""
+    """The problem of a robot whose axes have these transitions, see `kalman`, (2, 4, 6).
+
+    Args:
+        transition: The transitions.
+        inertia: As in `Problem`, and so the other weights.
+        variation: The same.
+        moment: The same.
+        effort: The same.
+        changes: Whether the force is held to that of the period before; else to the thrust.
+    """
     rows = [ERROR, RATE, THRUST]
-    A, B = np.zeros((NUMBERS, NUMBERS)), np.zeros((NUMBERS, AXES))
+    numbers = len(rows) + changes
+    A, B = np.zeros((AXES * numbers, AXES * numbers)), np.zeros((AXES * numbers, AXES))
     for axis in range(AXES):
-        own = slice(PER_AXIS * axis, PER_AXIS * (axis + 1))
+        first = numbers * axis
+        own = slice(first, first + len(rows))
         A[own, own] = transition[axis][np.ix_(rows, rows)]
         B[own, axis] = transition[axis][rows, COMMAND] / inertia[axis]
+        if changes:
+            B[first + len(rows), axis] = 1.0 / inertia[axis]
     return Problem(A, B, inertia, variation, moment, effort)
 
 
@@ -137,33 +157,37 @@ def solve(H, X):
 
 
 @piece
-def misses(u, thrust, wanted, T, problem, D, C):
+def misses(u, held, wanted, T, problem, D, C):
     """Fill in the residuals D du + C (dx, 1) of force and moment in a period, weighted."""
+    n = problem.transition.shape[0]
+    per_axis = n // AXES
     for r in range(AXES + 1):
         weight = problem.variation if r < AXES else problem.moment
-        C[r, NUMBERS] = -weight * (thrust[r] if r < AXES else wanted)
+        C[r, n] = -weight * (held[r] if r < AXES else wanted)
         for j in range(u.size):
             D[r, j] = weight * T[r, j]
-            C[r, NUMBERS] += D[r, j] * u[j]
+            C[r, n] += D[r, j] * u[j]
     for axis in range(AXES):
-        C[axis, PER_AXIS * axis + 2] = -problem.variation * problem.inertia[axis]
+        C[axis, per_axis * (axis + 1) - 1] = -problem.variation * problem.inertia[axis]
 
 
 @compiled
 def newton(u, foreseen, problem, room):
     """Fill in the gains of the Newton step, and its changes where the state does not change."""
     periods, m = u.shape
-    n, A, effort = NUMBERS, problem.transition, problem.effort**2
+    A, effort = problem.transition, problem.effort**2
+    n = A.shape[0]
+    per_axis = n // AXES
     # Hessian and gradient of the value, the latter as the last column; so it is in VA, K and C.
     V, VA, VB = np.zeros((n, n + 1)), np.empty((n, n + 1)), np.empty((n, m))
     B, D, C = np.empty((n, m)), np.empty((AXES + 1, m)), np.zeros((AXES + 1, n + 1))
     H, G, K = np.empty((m, m)), np.empty((m, n + 1)), np.empty((m, n + 1))
     for i in range(periods - 1, -1, -1):
         T = foreseen.allocation[i]
-        misses(u[i], foreseen.thrust[i], foreseen.wanted[i], T, problem, D, C)
+        misses(u[i], foreseen.held[i], foreseen.wanted[i], T, problem, D, C)
         for axis in range(AXES):
-            V[PER_AXIS * axis, PER_AXIS * axis] += 1.0
-            V[PER_AXIS * axis, n] += foreseen.error[i, axis]
+            V[per_axis * axis, per_axis * axis] += 1.0
+            V[per_axis * axis, n] += foreseen.error[i, axis]
         for matrix in (B, VB, H):
             matrix[:] = 0.0
         for matrix in (VA, G):
@@ -192,22 +216,24 @@ def newton(u, foreseen, problem, room):
 def follow(foreseen, problem, room, closed):
     """Follow the changes of the commands through the model; `closed` adds what the gains make."""
     periods, m = room.change.shape
-    x, after = np.zeros(NUMBERS), np.empty(NUMBERS)
+    n = problem.transition.shape[0]
+    per_axis = n // AXES
+    x, after = np.zeros(n), np.empty(n)
     for i in range(periods):
         T = foreseen.allocation[i]
         for j in range(m):
-            for k in range(NUMBERS if closed else 0):
+            for k in range(n if closed else 0):
                 room.change[i, j] += room.gain[i, j, k] * x[k]
-        for r in range(NUMBERS):
+        for r in range(n):
             after[r] = 0.0
-            for k in range(NUMBERS):
+            for k in range(n):
                 after[r] += problem.transition[r, k] * x[k]
             for axis in range(AXES):
                 for j in range(m):
                     after[r] += problem.input[r, axis] * T[axis, j] * room.change[i, j]
         for axis in range(AXES):
-            room.thrust[i, axis] = problem.inertia[axis] * x[PER_AXIS * axis + 2]
-            room.error[i, axis] = after[PER_AXIS * axis]
+            room.held[i, axis] = problem.inertia[axis] * x[per_axis * (axis + 1) - 1]
+            room.error[i, axis] = after[per_axis * axis]
         x[:] = after
 
 
@@ -216,7 +242,7 @@ def change_by(share, u, foreseen, room):
     """Make a share of the change that was followed."""
     u += share * room.change
     foreseen.error[:] += share * room.error
-    foreseen.thrust[:] += share * room.thrust
+    foreseen.held[:] += share * room.held
 
 
 @piece
@@ -241,14 +267,15 @@ def go_inside(u, limit, foreseen, problem, room):
             room.change[i, j] = min(max(u[i, j], -inner), inner) - u[i, j]
     follow(foreseen, problem, room, False)
     change_by(1.0, u, foreseen, room)
-    D, C, cost = np.empty((AXES + 1, m)), np.empty((AXES + 1, NUMBERS + 1)), 0.0
+    n = problem.transition.shape[0]
+    D, C, cost = np.empty((AXES + 1, m)), np.zeros((AXES + 1, n + 1)), 0.0
     for i in range(periods):
         T = foreseen.allocation[i]
-        misses(u[i], foreseen.thrust[i], foreseen.wanted[i], T, problem, D, C)
+        misses(u[i], foreseen.held[i], foreseen.wanted[i], T, problem, D, C)
         for axis in range(AXES):
             cost += foreseen.error[i, axis] ** 2
         for r in range(AXES + 1):
-            cost += C[r, NUMBERS] ** 2
+            cost += C[r, n] ** 2
     mu = INSIDE * cost / (periods * m)
     for i in range(periods):
         for j in range(m):
@@ -303,13 +330,14 @@ def improve(plan, limit, foreseen, problem):
         problem: What they share.
     """
     size, periods, m = plan.shape
-    gain, changes = np.empty((periods, m, NUMBERS)), np.empty((2, periods, AXES))
+    gain = np.empty((periods, m, problem.transition.shape[0]))
+    changes = np.empty((2, periods, AXES))
     rest = np.empty((5, periods, m))
     room = Room(gain, rest[0], changes[0], changes[1], rest[1], rest[2], rest[3], rest[4])
     for b in range(size):
         u = plan[b]
         own = Foreseen(
-            foreseen.error[b], foreseen.thrust[b], foreseen.wanted[b], foreseen.allocation[b]
+            foreseen.error[b], foreseen.held[b], foreseen.wanted[b], foreseen.allocation[b]
         )
         room.curvature[:] = 0.0
         room.slope[:] = 0.0

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from usm_baselines.allocation import ALLOCATIONS, PSEUDO_INVERSE, within
 from usm_baselines.estimation.navigator import ACCELERATION_NOISE, DISTURBANCE_NOISE, Navigator
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Gain, declared
@@ -54,6 +55,7 @@ class ScriptedPolicy:
         *,
         lag: bool = False,
         navigated: bool = False,
+        allocation: str = PSEUDO_INVERSE,
         **gains: float,
     ) -> None:
         """Take gains other than the defaults by name.
@@ -64,6 +66,8 @@ class ScriptedPolicy:
                 nominally does; without it, it is the command itself, as in the paper.
             navigated: Whether a navigator estimates the error and its rate for the law; without it,
                 the law takes the last position as it was measured.
+            allocation: How force and moment are shared out among the thrusters, one of
+                `allocation.ALLOCATIONS`.
             gains: Gains other than the defaults, by name.
 
         Raises:
@@ -87,6 +91,10 @@ class ScriptedPolicy:
         require(not (lag and self.planar), "lag", lag, "False for a law that models it")
         fitting = isinstance(nominal.robot, Robot) or not self.planar
         require(fitting, "robot", nominal.robot, "the planar robot")
+        require(allocation in ALLOCATIONS, "allocation", allocation, ", ".join(ALLOCATIONS))
+        self._within_limits = allocation != PSEUDO_INVERSE
+        fitting = isinstance(nominal.robot, Robot) or not self._within_limits
+        require(fitting, "allocation", allocation, f"{PSEUDO_INVERSE} for this robot")
 
     @property
     def densities(self) -> tuple[float, float]:
@@ -169,7 +177,11 @@ class ScriptedPolicy:
         action = np.empty((size, self._model.thrusters), np.float32)
         gain = self.gains.heading_gain
         act(observation, state, self._model, signals.allocation, force, gain, action)
-        return action
+        if not self._within_limits:
+            return action
+        model = self._model
+        limit = model.scale[model.thruster_limit] * observation[:, model.thruster_limit]
+        return within(action, limit, model.dead_band, signals.allocation)
 
     def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:
         numbers = self._own + math.prod(self.law_shape)

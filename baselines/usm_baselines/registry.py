@@ -10,13 +10,16 @@ from typing import Any
 
 from usm_baselines.gains import FOLDERS, TUNED, GainsFile, read_gains
 from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
+from usm_baselines.laws.disturbance_observer import DisturbanceObserver
 from usm_baselines.laws.generalised_super_twisting import (
     AdaptiveGeneralisedSuperTwisting,
     GeneralisedSuperTwisting,
 )
+from usm_baselines.laws.incremental import Incremental
 from usm_baselines.laws.informed_lqg import InformedLQG
 from usm_baselines.laws.joint_lqg import JointLQG
 from usm_baselines.laws.ladrc import LADRC
+from usm_baselines.laws.limited_mpc import LimitedMPC
 from usm_baselines.laws.lqg import LQG
 from usm_baselines.laws.mpc import MPC
 from usm_baselines.laws.oracle import Oracle
@@ -265,6 +268,18 @@ for _id in ("sta", "pd", "pid", "smc"):
         on_request=True,
     )
 register(
+    "dob",
+    DisturbanceObserver,
+    "disturbance observer: inverse of the nominal model behind a filter, pole placement",
+    told=BODY,
+)
+register(
+    "indi",
+    Incremental,
+    "incremental nonlinear dynamic inversion: the acceleration's error moves the force",
+    told=NAVIGATED,
+)
+register(
     "lqg",
     LQG,
     "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
@@ -290,6 +305,12 @@ register(
     privileged=True,
 )
 register("mpc", MPC, "predictive control on the nominal plant, joint motion known", told=FORESIGHT)
+register(
+    "mpc-limits",
+    LimitedMPC,
+    "the same with the thrusters' limits inside the problem",
+    told=FORESIGHT,
+)
 register(
     "oracle",
     Oracle,

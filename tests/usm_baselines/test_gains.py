@@ -39,7 +39,7 @@ def test_every_law_was_tuned_as_long_as_every_other_and_for_the_same(tier) -> No
 
 # Laws for conditions in which positions are late or rare, or the robot is unknown.
 BEYOND_FIELD = {"sta-navigator", "pd-navigator", "pid-navigator", "smc-navigator"}
-BEYOND_FIELD |= {"adaptive", "informed"}
+BEYOND_FIELD |= {"adaptive", "informed", "mpc-limits"}
 
 
 def test_every_law_has_shipped_gains() -> None:

@@ -38,11 +38,11 @@ def residuals(change: Array, plan: Array, known: Foreseen, given: Problem) -> Ar
     x, rows = np.zeros(6), []
     for i in range(PERIODS):
         T, command = known.allocation[i], plan[i] + change[i]
-        thrust = known.thrust[i] + INERTIA * x[[2, 5]]
+        held = known.held[i] + INERTIA * x[[2, 5]]
         x = given.transition @ x + given.input @ (T[:2] @ change[i])
         rows += [
             known.error[i] + x[[0, 3]],
-            given.variation * (T[:2] @ command - thrust),
+            given.variation * (T[:2] @ command - held),
             [given.moment * (T[2] @ command - known.wanted[i])],
             given.effort * command,
         ]

@@ -16,7 +16,10 @@ from usm_gym.task.nominal import Nominal
 from usm_gym.task.sampling import named, sample
 
 SCRIPTED = ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero")
-RIVALS = ("pid", "ladrc", "lqg", "lqg-joints", "mpc", "smc", "gsta", "agsta")
+RIVALS = (
+    *("pid", "ladrc", "dob", "indi", "smc", "gsta", "agsta"),
+    *("lqg", "lqg-joints", "mpc", "mpc-limits"),
+)
 
 
 @pytest.fixture(autouse=True)
