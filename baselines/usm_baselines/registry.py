@@ -264,7 +264,7 @@ for _id in ("sta", "pd", "pid", "smc"):
         partial(_law.factory, navigated=True),
         f"{_id} on the navigator's position and velocity",
         told=NAVIGATED,
-        space=_law.space,
+        space={name: span for name, span in _law.space.items() if name != "observer_gain"},
         on_request=True,
     )
 register(
