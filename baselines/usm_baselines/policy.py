@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_baselines.allocation import ALLOCATIONS, PSEUDO_INVERSE, within
 from usm_baselines.estimation.navigator import ACCELERATION_NOISE, DISTURBANCE_NOISE, Navigator
+from usm_baselines.estimation.prediction import PlantNavigator
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Gain, declared
 from usm_gym.robot import Robot
@@ -46,6 +47,8 @@ class ScriptedPolicy:
     state: tuple[str, ...] = ()
     # Those among them that the residual task shows to its agent.
     shown: tuple[str, ...] = ()
+    # What navigates, if something does.
+    navigator: type[Navigator] | type[PlantNavigator] = PlantNavigator
     # Whether the law computes with the inertia, drag or plant of the planar robot.
     planar = False
 
@@ -85,7 +88,7 @@ class ScriptedPolicy:
         self._world, self._model = world_of(nominal.robot), model_of(nominal, lag)
         # Before the law's own numbers stand those that all laws share.
         self._shared = shared_size(self._model)
-        self._navigator = Navigator(nominal, *self.densities) if navigated else None
+        self._navigator = self.navigator(nominal, *self.densities) if navigated else None
         self._own = self._shared + (self._navigator.size if self._navigator else 0)
         # Laws of the planar robot model the lag themselves.
         require(not (lag and self.planar), "lag", lag, "False for a law that models it")

@@ -206,7 +206,7 @@ def nominal_knowledge(env: Any) -> Nominal:
 
 # What laws are told besides the measured position and the reference.
 LAG = "lag"
-NAVIGATED = "lag, noise, delays, straight body"
+NAVIGATED = "lag, noise, delays, nominal plant"
 BODY, FORESIGHT = "lag, noise, straight body", "lag, noise, nominal plant, joint references"
 
 register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")

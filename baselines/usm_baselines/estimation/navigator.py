@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 # Spectral densities of what drives v (m/s^2 / sqrt(Hz)) and d (m/s^3 / sqrt(Hz)), for laws that do
 # not have them among their gains.
-ACCELERATION_NOISE, DISTURBANCE_NOISE = 2e-2, 0.02
+ACCELERATION_NOISE, DISTURBANCE_NOISE = 1e-2, 0.02
 # Numbers that are estimated in an axis, (e, v, d); for how long the disturbance of the start has
 # had to grow, s.
 STATES, UNKNOWN_FOR = 3, 10.0

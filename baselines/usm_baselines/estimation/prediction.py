@@ -351,3 +351,34 @@ class Predictor:
         blocks = np.zeros((-(-len(seen) // WIDTH), self._nominal.row.size * WIDTH))
         place_all(seen, self._nominal, state, past, self.beliefs(state), blocks)
         return blocks
+
+
+class PlantNavigator:
+    """A navigator as `navigator.Navigator`, but by the nominal plant.
+
+    Attributes:
+        size: Numbers of memory for each robot, those of a `Predictor`.
+    """
+
+    def __init__(
+        self, nominal: Nominal, acceleration_noise: float, disturbance_noise: float
+    ) -> None:
+        """Set up the filter; arguments as of `Predictor`."""
+        self._predictor = Predictor(nominal, acceleration_noise, disturbance_noise)
+        self._thrusters = slice(ESTIMATES, ESTIMATES + len(nominal.robot.thrusters))
+        self.size = self._predictor.size
+
+    def estimate(self, signals: Signals, mass: float, memory: Array) -> None:
+        """Predict by the nominal plant and take in what has arrived, in place.
+
+        Args:
+            signals: What was measured and applied; error, rate, disturbance and thrust are filled
+                in.
+            mass: Total mass, kg.
+            memory: Memory of the batch, (batch, size); zero at the start.
+        """
+        self._predictor.estimate(signals, memory)
+        estimates = memory[:, :ESTIMATES].reshape(-1, AXES, len(NAMES))
+        signals.y[:], signals.rate[:], signals.disturbance[:] = np.moveaxis(estimates, 2, 0)
+        T, forces = signals.allocation[:, :AXES], memory[:, np.newaxis, self._thrusters]
+        signals.thrust[:] = (T * forces).sum(axis=2) / mass

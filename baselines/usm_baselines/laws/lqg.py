@@ -17,7 +17,7 @@ import numpy as np
 
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.kalman import COMMAND, DISTURBANCE, ERROR, RATE, THRUST
-from usm_baselines.estimation.navigator import is_needed
+from usm_baselines.estimation.navigator import Navigator, is_needed
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
@@ -108,6 +108,7 @@ class LQG(ScriptedPolicy):
     state: tuple[str, ...] = ("error", "rate", "unmodelled", "thrust")
     shown = ("rate", "unmodelled")
     planar = True
+    navigator = Navigator
     # Whether the linear model predicts.
     linear = True
 
