@@ -271,7 +271,7 @@ register(
     "dob",
     DisturbanceObserver,
     "disturbance observer: inverse of the nominal model behind a filter, pole placement",
-    told=BODY,
+    told=NAVIGATED,
 )
 register(
     "indi",
