@@ -296,6 +296,7 @@ register(
     AdaptiveLQG,
     "the same, with coefficients, current and thruster gains identified on the way",
     told=FORESIGHT,
+    on_request=True,
 )
 register(
     "informed",
@@ -310,6 +311,7 @@ register(
     LimitedMPC,
     "the same with the thrusters' limits inside the problem",
     told=FORESIGHT,
+    on_request=True,
 )
 register(
     "oracle",

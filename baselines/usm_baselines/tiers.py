@@ -22,15 +22,15 @@ def meant_for(conditions: Conditions) -> list[str]:
     """Names of the policies that are meant for some conditions.
 
     For a tier they are those whose gains are tuned for it, the paper's two, and those that are
-    given true state and not tuned for anything else; for all other conditions all but those that
-    are tuned for a tier.
+    given true state and have no gains to tune; for all other conditions all but those that are
+    tuned for a tier.
     """
     tier = tier_of(conditions)
 
     def meant(id: str, policy: Registration) -> bool:
         if tier not in TIERS:
             return policy.tuned_for not in TIERS
-        unbound = id in PAPER or (policy.privileged and not policy.tuned_for)
-        return policy.tuned_for == tier or unbound
+        limit = policy.privileged and not policy.space and not policy.tuned_for
+        return policy.tuned_for == tier or id in PAPER or limit
 
     return [id for id in ids() if meant(id, entry(id))]
