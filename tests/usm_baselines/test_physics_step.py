@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import usm_agents  # noqa: F401 (registers agents)
 from usm_baselines.registry import entry, ids, make
+from usm_baselines.tiers import TIERS
 
 from usm_gym import Scenario, evaluate, suite
 from usm_gym.evaluation import rollout
@@ -79,7 +80,11 @@ def test_the_closed_loop_converges_in_second_order(id, gains, noise, filtered):
     assert (orders[: None if filtered else 2] >= 1.9).all(), orders
 
 
-COMPETITORS = [id for id in ids() if not entry(id).privileged]
+COMPETITORS = [
+    id
+    for id in ids()
+    if not entry(id).privileged and entry(id).tuned_for not in TIERS and "navigator" not in id
+]
 
 
 @pytest.mark.slow
@@ -88,14 +93,15 @@ COMPETITORS = [id for id in ids() if not entry(id).privileged]
     [
         *(("operation", id) for id in COMPETITORS if id != "residual-torpedo"),
         *(("torpedo", id) for id in ("sta", "lqg", "residual-torpedo")),
+        *(("operation-basin", id) for id in ("sta-navigator", "lqg-joints", "adaptive")),
     ],
 )
 def test_the_default_step_changes_no_score(suite_name, id):
     scenarios = suite(suite_name)
-    few = changes(id, scenarios[:8])
+    few = changes(id, scenarios[:4])
     if not all(abs(change.mean()) <= bound for change, bound in few):
-        # Single episodes of a loop that oscillates by itself are chaotic: the whole suite decides.
-        for change, bound in changes(id, scenarios):
+        # Single episodes of a loop that oscillates by itself are chaotic: many decide.
+        for change, bound in changes(id, scenarios[:30]):
             mean, (low, high) = mean_interval(change)
             assert abs(mean) <= bound or low <= 0.0 <= high
             assert high - low < 20.0 * bound  # else an interval that holds 0 shows nothing
