@@ -93,15 +93,15 @@ COMPETITORS = [
     [
         *(("operation", id) for id in COMPETITORS if id != "residual-torpedo"),
         *(("torpedo", id) for id in ("sta", "lqg", "residual-torpedo")),
-        *(("operation-basin", id) for id in ("sta-navigator", "lqg-joints", "adaptive")),
+        ("operation-basin", "lqg-joints"),
     ],
 )
 def test_the_default_step_changes_no_score(suite_name, id):
     scenarios = suite(suite_name)
     few = changes(id, scenarios[:4])
     if not all(abs(change.mean()) <= bound for change, bound in few):
-        # Single episodes of a loop that oscillates by itself are chaotic: many decide.
-        for change, bound in changes(id, scenarios[:30]):
+        # Single episodes of a loop that oscillates by itself are chaotic: the whole suite decides.
+        for change, bound in changes(id, scenarios):
             mean, (low, high) = mean_interval(change)
             assert abs(mean) <= bound or low <= 0.0 <= high
             assert high - low < 20.0 * bound  # else an interval that holds 0 shows nothing
