@@ -246,9 +246,11 @@ def test_a_worker_that_ends_early_is_one_line(tmp_path):
     arguments = ("--policies", "zero,mine:Leaving", "--episodes", "2", "--workers", "2")
     answer = usm("evaluate", *arguments, cwd=tmp_path)
     assert answer.returncode == 2
-    assert answer.stderr == (
-        "usm: error: a worker process ended before its task was done: EXIT(3)\n"
-    )
+    said, *others = answer.stderr.splitlines()
+    assert said == "usm: error: a worker process ended before its task was done: EXIT(3)"
+    # On a busy machine loky's own process may add what it has cleaned up after the worker.
+    assert "Traceback" not in answer.stderr
+    assert all("resource_tracker" in line or "warnings.warn" in line for line in others)
 
 
 def test_a_closed_pipe_leaves_no_traceback():
