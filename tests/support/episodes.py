@@ -24,6 +24,22 @@ HARDER = Conditions(
     deflection_range=(0.9, 2.1),
     filter_range=(8.0, 14.0),
 )
+# Every sensor errs, measures rarely or late, and yet `sta` loses no robot; fields of conditions.
+NOISY = {
+    "position_noise": 2e-4,
+    "position_missing": 0.02,
+    "velocity_period": 3,
+    "velocity_delay": 2,
+    "velocity_noise": 5e-3,
+    "tail_angle_noise": 1e-3,
+    "joint_angle_noise": 1e-3,
+    "rate_noise": 1e-3,
+    "thruster_dead_band": 0.1,
+    "thruster_gain_range": [0.95, 1.05],
+    "current_variation": 0.02,
+    "wave_limit": 0.02,
+    "coefficient_spread": 0.1,
+}
 
 
 def short(count: int, duration: float = 1.0, seed: int = 0) -> list[Scenario]:

@@ -14,13 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from usm_baselines.estimation.navigator import (
-    covariance,
-    memory_size,
-    navigate,
-    navigation,
-    transition_of,
-)
+from usm_baselines.estimation.late_filter import covariance, memory_size, navigate
+from usm_baselines.estimation.navigator import navigation, transition_of
 from usm_baselines.estimation.prediction import (
     AXES,
     CURRENT,

@@ -15,13 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_baselines.estimation import kalman
-from usm_baselines.estimation.navigator import (
-    is_needed,
-    memory_size,
-    navigate,
-    navigation,
-    transition_of,
-)
+from usm_baselines.estimation.late_filter import memory_size, navigate
+from usm_baselines.estimation.navigator import is_needed, navigation, transition_of
 from usm_baselines.signals import Array, Signals, commanded
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread

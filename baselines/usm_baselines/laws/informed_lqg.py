@@ -9,14 +9,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS, Predictor
 from usm_baselines.laws.adaptive_lqg import compensated
 from usm_baselines.laws.joint_lqg import JointLQG
+from usm_baselines.privileged import PrivilegedPolicy
 from usm_baselines.signals import Array
 from usm_gym.simulation import Snapshot
-from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 
 
@@ -47,10 +47,8 @@ class Told(Predictor):
         return belief
 
 
-class InformedLQG(JointLQG):
+class InformedLQG(PrivilegedPolicy, JointLQG):
     """LQG control that is told what no controller can measure: no competitor."""
-
-    privileged = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
@@ -61,34 +59,11 @@ class InformedLQG(JointLQG):
         self._told = Told(nominal, *self.densities)
         return self._told
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Array | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-        *,
-        snapshot: Snapshot | None = None,
-    ) -> tuple[NDArray[np.float32], Array]:
-        """Act as `ScriptedPolicy.predict`, knowing what is constant in the episodes.
-
-        Args:
-            observation: Observations, (batch, numbers).
-            state: What the last call returned; None at the start.
-            episode_start: Where an episode starts.
-            deterministic: Without effect.
-            snapshot: The true state of the simulation that is observed, of which only the constants
-                of its scenarios are read.
-
-        Raises:
-            ValueError: If there is no snapshot.
-        """
-        require(isinstance(snapshot, Snapshot), "snapshot", snapshot, "the true state")
-        assert snapshot is not None
+    def take_in(self, snapshot: Snapshot) -> None:
+        """Read the constants of the scenarios, and nothing else."""
         if snapshot.scenarios != self._scenarios:
             self._scenarios = snapshot.scenarios
             self._told.tell(snapshot.scenarios)
-        return super().predict(observation, state, episode_start, deterministic)
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         return compensated(super()._act(observation, state), self._told.truth)

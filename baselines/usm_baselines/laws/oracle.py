@@ -20,15 +20,15 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from usm_baselines.estimation import kalman
 from usm_baselines.planning import Foreseen, improve, problem_of
-from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
+from usm_baselines.policy import HEADING_GAIN
+from usm_baselines.privileged import PrivilegedPolicy
 from usm_baselines.signals import Array
 from usm_baselines.space import Gain
 from usm_gym.simulation import Simulation, Snapshot
-from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 
 # Errors of the position, m, that are as bad as a moment that is wrong by 1 N m, and as 1 N of a
@@ -50,14 +50,13 @@ class OracleGains(NamedTuple):
     heading_gain: float = HEADING_GAIN
 
 
-class Oracle(ScriptedPolicy):
+class Oracle(PrivilegedPolicy):
     """Predictive control that is given the true state: no competitor.
 
     Its state has the plan, N. Its actions are within the limits.
     """
 
     Gains = OracleGains
-    privileged = True
     planar = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
@@ -80,30 +79,9 @@ class Oracle(ScriptedPolicy):
         """The plan: commands of the thrusters in each period."""
         return self._periods, self._model.thrusters
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Array | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-        *,
-        snapshot: Snapshot | None = None,
-    ) -> tuple[NDArray[np.float32], Array]:
-        """Act as `ScriptedPolicy.predict`, knowing the true state.
-
-        Args:
-            observation: Observations, (batch, numbers).
-            state: What the last call returned; None at the start.
-            episode_start: Where an episode starts.
-            deterministic: Without effect.
-            snapshot: The true state of the simulation that is observed.
-
-        Raises:
-            ValueError: If there is no snapshot.
-        """
-        require(isinstance(snapshot, Snapshot), "snapshot", snapshot, "the true state")
+    def take_in(self, snapshot: Snapshot) -> None:
+        """Run ahead from the true state."""
         self._copy = self._copy_of(snapshot)
-        return super().predict(observation, state, episode_start, deterministic)
 
     def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
         """Carry the plan on by a period, see what comes of it, correct it."""

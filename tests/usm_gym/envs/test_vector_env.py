@@ -5,28 +5,13 @@ import numpy as np
 import pytest
 import usm_baselines
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from support.episodes import NOISY
 
 import usm_gym
 
 ID = "USM-Operation-v0"
 # Light thrusters and a strong current: some robots are lost soon, others late or never.
 HARD = {"thruster_limit": 3.0, "current_limit": 0.3}
-# Every sensor errs, measures rarely or late, and yet `sta` loses no robot.
-NOISY = {
-    "position_noise": 2e-4,
-    "position_missing": 0.02,
-    "velocity_period": 3,
-    "velocity_delay": 2,
-    "velocity_noise": 5e-3,
-    "tail_angle_noise": 1e-3,
-    "joint_angle_noise": 1e-3,
-    "rate_noise": 1e-3,
-    "thruster_dead_band": 0.1,
-    "thruster_gain_range": [0.95, 1.05],
-    "current_variation": 0.02,
-    "wave_limit": 0.02,
-    "coefficient_spread": 0.1,
-}
 
 
 def native(count, **arguments):
