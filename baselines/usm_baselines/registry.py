@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import partial
 from typing import Any
 
@@ -31,7 +32,7 @@ from usm_baselines.laws.zero import Zero
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.space import Space, space_of
 from usm_gym.policy import Policy
-from usm_gym.support.validation import UsageError, require
+from usm_gym.support.validation import UsageError, brief, require
 from usm_gym.task.nominal import Nominal
 
 # What a policy is told that is told no more than the measured position and the reference.
@@ -159,7 +160,10 @@ def entry(id: str) -> Registration:
     Raises:
         ValueError: If there is none.
     """
-    require(id in _entries, "policy", id, ", ".join(_entries))
+    if id not in _entries:
+        near = get_close_matches(str(id), _entries, n=3)
+        meant = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise UsageError(f"policy is {brief(id)}; allowed: those that `usm policies` lists{meant}")
     return _entries[id]
 
 

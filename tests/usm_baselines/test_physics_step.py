@@ -97,7 +97,8 @@ COMPETITORS = [
     ],
 )
 def test_the_default_step_changes_no_score(suite_name, id):
-    scenarios = suite(suite_name)
+    # Half of an episode has the first shifts in it, which is where errors are largest.
+    scenarios = [replace(each, duration=each.settle_time + 17.0) for each in suite(suite_name)]
     few = changes(id, scenarios[:4])
     if not all(abs(change.mean()) <= bound for change, bound in few):
         # Single episodes of a loop that oscillates by itself are chaotic: the whole suite decides.

@@ -142,7 +142,10 @@ def test_conditions_override_the_suites_own_and_are_marked(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["evaluate", "--policies", "nobody"], "policy is 'nobody'; allowed: sta"),
+        (
+            ["evaluate", "--policies", "nobody"],
+            "policy is 'nobody'; allowed: those that `usm policies` lists",
+        ),
         (["evaluate", "--policies", ","], "--policies"),
         (["evaluate", "--suite", "nowhere"], "suite is 'nowhere'; allowed: operation"),
         (["evaluate", "--suite", "missing.json"], "missing.json"),

@@ -31,7 +31,8 @@ def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys):
     data = chosen("--conditions", "basin")
     assert (data["suite"], data["conditions_override"]) == ("operation-basin", "basin")
     assert data["scenarios"] == [suite("operation-basin")[0].to_dict()]
-    assert set(data["results"]) == {"sta", "pd", "mine-basin"}
+    assert {"sta", "pd", "mine-basin"} <= set(data["results"])
+    assert all(name in ("sta", "pd") or name.endswith("-basin") for name in data["results"])
     assert chosen("--suite", "operation-basin")["results"] == data["results"]
     row = data["results"]["mine-basin"]
     assert row["tuned_for"] == "basin"
