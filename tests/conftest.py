@@ -1,7 +1,9 @@
 import os
+import subprocess
 import sys
 from datetime import timedelta
 from importlib import import_module, util
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -13,6 +15,20 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # windows of the tests appear
 settings.register_profile("short", max_examples=25, deadline=None, derandomize=True)
 settings.register_profile("long", max_examples=2000, deadline=timedelta(seconds=10))
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "short"))
+
+
+def pytest_sessionstart(session):
+    """Before all tests are run by several workers, compile what most of them need, once."""
+    whole = session.config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if (
+        whole
+        and session.config.getoption("dist", "no") != "no"
+        and "PYTEST_XDIST_WORKER" not in os.environ
+    ):
+        script = Path(__file__).parent / "support" / "warm_up.py"
+        parts = [subprocess.Popen([sys.executable, script, part]) for part in ("robots", "laws")]
+        for part in parts:
+            part.wait()
 
 
 def pytest_collection_modifyitems(items):

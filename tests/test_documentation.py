@@ -4,13 +4,18 @@ import re
 import shlex
 import shutil
 import tomllib
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 import usm_baselines
 from markdown_it import MarkdownIt
 from usm_agents.artifact.folder import PRETRAINED
+from usm_agents.learning import training
 
+import usm_gym
+from usm_cli.commands import leaderboard
 from usm_cli.program import main
 
 ROOT = Path(__file__).parents[1]
@@ -21,7 +26,8 @@ BUDGETS = {
     "usm policies": "",
     "usm evaluate": "--mode operation --episodes 2",
     "usm compare": "--mode operation --episodes 2",
-    "usm robustness --vary delay": "--values 0,1 --episodes 2",
+    "usm robustness --vary delay": "--values 1 --episodes 2",
+    "usm robustness --vary step": "--values 0.5 --episodes 2",
     "usm robustness": "--values 0.05 --episodes 2",
     "usm tune": "--trials 2 --episodes 2",
     "usm leaderboard": "--policies zero --workers 1",
@@ -78,6 +84,10 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "README.md").write_bytes((ROOT / "README.md").read_bytes())
     shutil.copytree(ROOT / "results", tmp_path / "results")
     monkeypatch.chdir(tmp_path)
+    few = {name: scenarios[:2] for name, scenarios in leaderboard.suites().items()}
+    monkeypatch.setattr(leaderboard, "suites", lambda: few)
+    trained = partial(training.train, validation_episodes=2, test_episodes=2)
+    monkeypatch.setattr(training, "train", trained)
     return tmp_path
 
 
@@ -121,7 +131,9 @@ def test_every_law_has_its_place_among_the_controllers():
 
 
 @pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path):
+def test_the_site_builds_without_a_warning(tmp_path, monkeypatch):
+    short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
+    monkeypatch.setattr(usm_gym, "suite", lambda name: short)
     commands = pytest.importorskip("mkdocs.commands.build")
     config = pytest.importorskip("mkdocs.config").load_config(
         str(ROOT / "mkdocs.yml"), strict=True, site_dir=str(tmp_path)

@@ -237,12 +237,21 @@ def follow(foreseen, problem, room, closed):
         x[:] = after
 
 
+# Loops: numba compiles expressions of whole arrays, however short, for seconds.
+@compiled
+def add_share(share, X, out):
+    """Add a share of a matrix to another."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] += share * X[i, j]
+
+
 @piece
 def change_by(share, u, foreseen, room):
     """Make a share of the change that was followed."""
-    u += share * room.change
-    foreseen.error[:] += share * room.error
-    foreseen.held[:] += share * room.held
+    add_share(share, room.change, u)
+    add_share(share, room.error, foreseen.error)
+    add_share(share, room.held, foreseen.held)
 
 
 @piece
@@ -319,6 +328,16 @@ def step_inside(u, limit, foreseen, problem, room):
     change_by(share, u, foreseen, room)
 
 
+@piece
+def stays_within(u, change, limit):
+    """Whether changed commands are within their limits."""
+    largest = 0.0
+    for i in range(u.shape[0]):
+        for j in range(u.shape[1]):
+            largest = max(largest, abs(u[i, j] + change[i, j]))
+    return largest <= limit
+
+
 @compiled
 def improve(plan, limit, foreseen, problem):
     """Improve the plans of a batch, in place, and with them what is foreseen.
@@ -343,7 +362,7 @@ def improve(plan, limit, foreseen, problem):
         room.slope[:] = 0.0
         newton(u, own, problem, room)
         follow(own, problem, room, True)
-        if np.abs(u + room.change).max() <= limit[b]:
+        if stays_within(u, room.change, limit[b]):
             change_by(1.0, u, own, room)
             continue
         go_inside(u, limit[b], own, problem, room)

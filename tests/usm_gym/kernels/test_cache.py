@@ -155,28 +155,29 @@ def test_kernels_of_other_packages_notice_edits_in_all_their_folders(tmp_path):
     assert run(OWN, **environment) == ["0 8.0"]
 
 
+IMPORTS = {
+    "import os, constants\nGAIN = constants.GAIN": "GAIN",
+    "if True:\n    from constants import GAIN": "GAIN",
+    "from constants import (  # a comment)\n    GAIN,\n)": "GAIN",
+    "import sys; from constants import \\\n    GAIN": "GAIN",
+    "from constants import *": "GAIN",
+    "import constants as c": "c.GAIN",
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "imported",
-    [
-        "import os, constants\nGAIN = constants.GAIN",
-        "if True:\n    from constants import GAIN",
-        "from constants import (  # a comment)\n    GAIN,\n)",
-        "import sys; from constants import \\\n    GAIN",
-        "from constants import *",
-        "import constants as c",
-    ],
-)
-def test_a_constant_of_any_package_is_noticed_however_it_is_imported(imported, tmp_path):
-    gain = "c.GAIN" if imported.endswith("c") else "GAIN"
-    law = f"{imported}\nfrom usm_gym.kernels.compile import compiled\n\n\n"
-    (tmp_path / "law.py").write_text(
-        f"{law}@compiled\ndef force(x):\n    return {gain} * x\n\n\nprint(force(2.0))\n"
-    )
+def test_a_constant_of_any_package_is_noticed_however_it_is_imported(tmp_path):
+    laws = [f"law_{k}" for k in range(len(IMPORTS))]
+    for law, (imported, gain) in zip(laws, IMPORTS.items(), strict=True):
+        head = f"{imported}\nfrom usm_gym.kernels.compile import compiled\n\n\n"
+        (tmp_path / f"{law}.py").write_text(
+            f"{head}@compiled\ndef force(x):\n    return {gain} * x\n\n\nprint(force(2.0))\n"
+        )
     environment = {"PYTHONPATH": tmp_path, "NUMBA_CACHE_DIR": tmp_path / "cache"}
     for value in (3.0, 4.0):
         (tmp_path / "constants.py").write_text(f"GAIN = {value}\n")
-        assert run("import law", **environment) == [str(2.0 * value)]
+        answers = run(f"import {', '.join(laws)}", **environment)
+        assert answers == len(laws) * [str(2.0 * value)]
 
 
 SHARED = """
