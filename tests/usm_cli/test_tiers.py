@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -14,16 +13,11 @@ from usm_cli.program import main
 from usm_gym.suites import suite
 
 
-def brief(name):
-    """The beginning of the first scenario of a suite."""
-    return [replace(each, duration=each.settle_time + 15.0) for each in suite(name)[:1]]
-
-
 @pytest.fixture
 def chosen(tmp_path, monkeypatch):
     """Return what an evaluation of a scenario of the chosen suite writes; the laws are made up."""
     register_with_tiers(monkeypatch, tmp_path, "mine")
-    monkeypatch.setattr(selection, "suite", brief)
+    monkeypatch.setattr(selection, "suite", lambda name: suite(name)[:1])
     output = tmp_path / "result.json"
 
     def evaluated(*arguments):
@@ -36,7 +30,7 @@ def chosen(tmp_path, monkeypatch):
 def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys):
     data = chosen("--conditions", "basin")
     assert (data["suite"], data["conditions_override"]) == ("operation-basin", "basin")
-    assert data["scenarios"] == [brief("operation-basin")[0].to_dict()]
+    assert data["scenarios"] == [suite("operation-basin")[0].to_dict()]
     assert {"sta", "pd", "mine-basin"} <= set(data["results"])
     assert all(name in ("sta", "pd") or name.endswith("-basin") for name in data["results"])
     assert chosen("--suite", "operation-basin")["results"] == data["results"]
