@@ -13,6 +13,7 @@ import usm_baselines
 from markdown_it import MarkdownIt
 from usm_agents.artifact.folder import PRETRAINED
 from usm_agents.learning import training
+from usm_agents.learning.plan import Plan
 
 import usm_gym
 from usm_cli.commands import leaderboard
@@ -86,6 +87,12 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     few = {name: scenarios[:2] for name, scenarios in leaderboard.suites().items()}
     monkeypatch.setattr(leaderboard, "suites", lambda: few)
+    sampled = Plan.scenario
+    monkeypatch.setattr(
+        Plan,
+        "scenario",
+        lambda plan, random: replace(sampled(plan, random), duration=2.0, settle_time=0.5),
+    )
     trained = partial(training.train, validation_episodes=2, test_episodes=2)
     monkeypatch.setattr(training, "train", trained)
     return tmp_path

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_baselines.allocation import ALLOCATIONS, PSEUDO_INVERSE, within
 from usm_baselines.estimation.navigator import ACCELERATION_NOISE, DISTURBANCE_NOISE, Navigator
-from usm_baselines.estimation.prediction import PlantNavigator
+from usm_baselines.estimation.plant_navigator import PlantNavigator
+from usm_baselines.estimation.prediction import Predictor, tell
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Gain, declared
 from usm_gym.robot import Robot
@@ -37,6 +38,8 @@ class ScriptedPolicy:
     Attributes:
         nominal: What the policy knows of the robot.
         gains: The law's gains, one of its `Gains`.
+        predictor: What estimates for the law by the nominal plant, or by one that it identifies;
+            None if nothing does.
         privileged: Whether it has to be given true state; never, here.
     """
 
@@ -90,6 +93,9 @@ class ScriptedPolicy:
         self._shared = shared_size(self._model)
         self._navigator = self.navigator(nominal, *self.densities) if navigated else None
         self._own = self._shared + (self._navigator.size if self._navigator else 0)
+        self.predictor: Predictor | None = None
+        if isinstance(self._navigator, PlantNavigator):
+            self.predictor = self._navigator.predictor
         # Laws of the planar robot model the lag themselves.
         require(not (lag and self.planar), "lag", lag, "False for a law that models it")
         fitting = isinstance(nominal.robot, Robot) or not self.planar
@@ -105,6 +111,15 @@ class ScriptedPolicy:
         return ACCELERATION_NOISE, DISTURBANCE_NOISE
 
     @property
+    def predictor_columns(self) -> slice:
+        """Columns of what `predict` returns that hold the state of the predictor, if there is one.
+
+        They begin with (e, v, d) of each axis.
+        """
+        first = self._own if self._navigator is None else self._shared
+        return slice(first, first + (self.predictor.size if self.predictor else 0))
+
+    @property
     def columns(self) -> dict[str, NDArray[np.int64]]:
         """Columns of what `predict` returns that hold the numbers of `state`, by name, (axes,)."""
         first = self._own + len(self.state) * np.arange(self._model.axes, dtype=np.int64)
@@ -118,6 +133,20 @@ class ScriptedPolicy:
     def law_shape(self) -> tuple[int, ...]:
         """Shape of what the law keeps of one robot, the numbers of `state` first."""
         return (self._model.axes, len(self.state))
+
+    def estimate(self, signals: Signals, memory: Array, state: Array) -> None:
+        """Fill in the estimates among the signals, if the law acts on any.
+
+        Args:
+            signals: What the law works with.
+            memory: Memory of the navigator, moved on in place.
+            state: What the law keeps, (batch, *law_shape).
+        """
+        if self._navigator is not None:
+            self._navigator.estimate(signals, self._model.mass, memory)
+        elif self.predictor is not None:
+            self.predictor.estimate(signals, state)
+            tell(signals, self._model.mass, state)
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
         """Fill in the force on the centre of mass, N, and advance the law's state.
@@ -135,6 +164,8 @@ class ScriptedPolicy:
         state: Array | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
+        *,
+        correction: Array | None = None,
     ) -> tuple[NDArray[np.float32], Array]:
         """Act on one observation or on a batch.
 
@@ -144,14 +175,20 @@ class ScriptedPolicy:
             episode_start: Where an episode starts and the state is dropped, bool, a scalar
                 or (batch,).
             deterministic: Without effect: the laws are deterministic.
+            correction: What to add to the estimates that a law with a predictor acts on: of error,
+                m, its rate, m/s, and what the plant leaves out, m/s^2, (batch, axes, 3). The filter
+                behind them stays as it is.
 
         Returns:
             Thruster commands over the limit, not clipped, (thrusters,) or (batch, thrusters), and
             the state for the next call.
 
         Raises:
-            ValueError: If the shape of the observation or the state is wrong.
+            ValueError: If the shape of the observation or the state is wrong, or the law has
+                no predictor.
         """
+        fitting = correction is None or self.predictor is not None
+        require(fitting, "correction", correction, "None for this law, which has no predictor")
         seen = np.asarray(observation, np.float32)
         numbers = self._model.scale.size
         require(
@@ -162,18 +199,22 @@ class ScriptedPolicy:
         )
         batch = seen.reshape(-1, numbers)
         new_state = self._state(len(batch), state, episode_start)
-        action = self._act(batch, new_state)
+        action = self._act(batch, new_state, correction)
         return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
 
-    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
+    def _act(
+        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
+    ) -> NDArray[np.float32]:
         size = len(observation)
-        navigator = self._navigator
-        signals = signals_of(observation, self._model, self._world, navigator is not None)
+        navigated = self._navigator is not None
+        signals = signals_of(observation, self._model, self._world, navigated)
         sense(state, self._model, signals)
-        if navigator is not None:
-            memory = state[:, self._shared : self._own]
-            navigator.estimate(signals, self._model.mass, memory)
         own = state[:, self._own :].copy().reshape(size, *self.law_shape)
+        self.estimate(signals, state[:, self._shared : self._own], own)
+        if correction is not None:
+            signals.y[:] += correction[:, :, 0]
+            signals.rate[:] += correction[:, :, 1]
+            signals.disturbance[:] += correction[:, :, 2]
         force = np.empty_like(signals.y)
         self.control(signals, own, force)
         state[:, self._own :] = own.reshape(size, -1)

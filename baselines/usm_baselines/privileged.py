@@ -27,6 +27,7 @@ class PrivilegedPolicy(ScriptedPolicy):
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
         *,
+        correction: Array | None = None,
         snapshot: Snapshot | None = None,
     ) -> tuple[NDArray[np.float32], Array]:
         """Act as `ScriptedPolicy.predict`, knowing the true state.
@@ -36,6 +37,7 @@ class PrivilegedPolicy(ScriptedPolicy):
             state: What the last call returned; None at the start.
             episode_start: Where an episode starts.
             deterministic: Without effect.
+            correction: What to add to the law's estimates.
             snapshot: The true state of the simulation that is observed.
 
         Raises:
@@ -44,4 +46,6 @@ class PrivilegedPolicy(ScriptedPolicy):
         require(isinstance(snapshot, Snapshot), "snapshot", snapshot, "the true state")
         assert snapshot is not None
         self.take_in(snapshot)
-        return super().predict(observation, state, episode_start, deterministic)
+        return super().predict(
+            observation, state, episode_start, deterministic, correction=correction
+        )

@@ -341,3 +341,26 @@ def test_stable_baselines_evaluates_every_policy(id: str) -> None:
     expected = [by_hand(policy, 5, 2), by_hand(policy, 6, 2)]
     np.testing.assert_allclose(returns, np.transpose(expected).ravel(), rtol=1e-6)
     assert len(set(returns)) == 4
+
+
+@pytest.mark.parametrize("id", ["sta-navigator", "lqg-joints", "mpc", "adaptive"])
+def test_a_correction_changes_what_a_law_does_and_not_what_it_believes(id: str) -> None:
+    nominal = named("nominal", "operation", PRESETS["basin"]).nominal
+    policy: Any = usm_baselines.make(id, nominal)
+    seen, state = observations(20, 2, conditions="basin"), None
+    for now in seen:
+        before = state
+        action, state = policy.predict(now, before)
+        same, kept = policy.predict(now, before, correction=np.zeros((2, 2, 3)))
+        np.testing.assert_array_equal(action, same)
+        np.testing.assert_array_equal(state, kept)
+        corrected, kept = policy.predict(now, before, correction=np.full((2, 2, 3), 1e-3))
+        believed = policy.predictor_columns
+        np.testing.assert_array_equal(state[:, believed], kept[:, believed])
+    assert (action != corrected).any()
+
+
+def test_a_law_that_estimates_nothing_takes_no_correction() -> None:
+    policy = made("sta")
+    with pytest.raises(ValueError, match="correction"):
+        policy.predict(observations(1, 1)[0], correction=np.zeros((1, 2, 3)))

@@ -12,18 +12,20 @@ from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
 
 DESCRIPTION = """\
-Train an agent that adds residual thrust to a base policy. The folder then holds the agent, which
---policies takes, its learning curve on held-out scenarios of the training distribution, logs for
-TensorBoard, and the last checkpoint. Training never uses frozen suites. `usm train --resume
---output DIR` continues from the last checkpoint and ends as if it had never been interrupted. A
-checkpoint is code, and resuming runs it, so resume only your own trainings. Without --resume, a
-folder that holds any part of a training is refused, and nothing in it is opened. Needs the extra
-`agents`, unless the learner is your own (docs/residual.md).
+Train an agent that adds residual thrust to a base policy, or corrects what the base believes. The
+folder then holds the agent, which --policies takes, its learning curve on held-out scenarios of the
+training distribution, logs for TensorBoard, and the last checkpoint. Training never uses frozen
+suites. `usm train --resume --output DIR` continues from the last checkpoint and ends as if it had
+never been interrupted. A checkpoint is code, and resuming runs it, so resume only your own
+trainings. Without --resume, a folder that holds any part of a training is refused, and nothing in
+it is opened. Needs the extra `agents`, unless the learner is your own (docs/residual.md).
 """
 EXAMPLES = """\
 examples:
   usm train --output mine                             PPO on the paper's controller
   usm train --algorithm tqc --base pd --output mine   another algorithm on another base
+  usm train --algorithm estimator --action estimates --base lqg-joints-basin --conditions basin \\
+      --steps 2300000 --output believing              learn what to believe in a basin
   usm train --resume --output mine                    continue after an interruption
   usm evaluate --policies sta,mine                    score the agent
 """
@@ -33,13 +35,20 @@ OPTIONS = (
         "algorithm",
         str,
         "A",
-        "ppo, recurrent-ppo, sac, td3, tqc, or my_module:mine, where importing my_module registers "
-        "your own learner as mine (default: ppo)",
+        "ppo, recurrent-ppo, sac, td3, tqc, estimator (with --action estimates), or "
+        "my_module:mine, where importing my_module registers your own learner as mine "
+        "(default: ppo)",
     ),
     ("env", str, "ID", "residual task (default: usm_agents:USM-OperationResidual-v0)"),
     ("base", str, "NAME", "base policy: an id or ID@gains.json (default: sta)"),
     ("residual_scale", float, "N", "largest residual, N and N m (default: 20)"),
-    ("action", str, "KIND", "wrench on the centre of mass, or thrusters (default: wrench)"),
+    (
+        "action",
+        str,
+        "KIND",
+        "what the agent adds to: the base's wrench or thrusters, or the "
+        "estimates that it acts on (default: wrench)",
+    ),
     ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of all random numbers (default: 0)"),
     ("steps", int, "N", "steps of all robots together (default: 3000000)"),

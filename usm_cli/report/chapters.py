@@ -388,15 +388,9 @@ def provenance(source: Provenance) -> Facts:
     """The provenance of a result."""
     packages = ", ".join(f"{name} {version}" for name, version in source.packages.items())
     seeds = "; ".join(f"{name}: {_listed(value)}" for name, value in source.seeds.items())
-    return Facts(
-        "Where this comes from",
-        {
-            "command": source.command,
-            "version": f"usm-gym {source.version}, commit {source.commit or 'unknown'}",
-            "packages": packages,
-            "seeds": seeds,
-        },
-    )
+    version = f"usm-gym {source.version}, commit {source.commit or 'unknown'}"
+    facts = {"command": source.command, "version": version, "packages": packages, "seeds": seeds}
+    return Facts("Where this comes from", facts)
 
 
 def _listed(value: Any) -> str:

@@ -204,9 +204,11 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
     def truth(self) -> dict[str, NDArray[np.float64]]:
         """True parameters and signals of all robots, for training; no policy is given them.
 
-        See `World.truth`.
+        Returns:
+            What `World.truth` returns, and `error`, the position's, m, (robots, axes).
         """
-        return self.simulation.world.truth(self.simulation.read)
+        truth = self.simulation.world.truth(self.simulation.read)
+        return truth | {"error": self.simulation.error.copy()}
 
     def snapshot(self) -> VectorSnapshot:
         """Copy the whole state, the streams from which scenarios are drawn included."""

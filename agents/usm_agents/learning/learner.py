@@ -48,9 +48,10 @@ class TrainingSetup:
         episode_seed: Seed of the scenarios that follow the first ones.
         first_episodes: One per robot, of all lengths, so that the robots are at different
             times of their episodes from then on.
+        draw: Draws a scenario of the training distribution from a stream.
         truth: Gives what no policy can observe, by name, for the robots as `envs` last returned
             them, in SI units, (robots, numbers). On the tasks of this package: "coefficients",
-            "water_velocity", "velocity" and "disturbance", see `PlanarWorld.truth`.
+            "water_velocity", "velocity", "error" and "disturbance", see `PlanarWorld.truth`.
         folder: The folder of the training, for logs that TensorBoard reads.
     """
 
@@ -60,6 +61,7 @@ class TrainingSetup:
     envs: ResidualVectorEnv
     episode_seed: int
     first_episodes: Sequence[Scenario]
+    draw: Callable[[np.random.Generator], Scenario]
     truth: Callable[[], Truth]
     folder: Path
 
@@ -164,5 +166,6 @@ def _algorithm(name: str) -> Algorithm:
     return _algorithms[registered]
 
 
+LEARNERS = {"estimator": "usm_agents.learning.supervised.learner:EstimatorLearner"}
 for _name, _settings in SETTINGS.items():
-    register(_name, "usm_agents.learning.sb3.learner:SB3Learner", _settings)
+    register(_name, LEARNERS.get(_name, "usm_agents.learning.sb3.learner:SB3Learner"), _settings)

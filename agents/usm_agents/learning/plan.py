@@ -16,7 +16,7 @@ from usm_agents.learning.learner import algorithms
 from usm_agents.residual.task import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.support.files import read_bytes, write_json
 from usm_gym.support.validation import Count, UsageError, in_one_line, require, validated
-from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.conditions import FIELD, Conditions, preset_of
 from usm_gym.task.sampling import sample
 from usm_gym.task.scenario import Mode, Scenario
 
@@ -37,13 +37,13 @@ class Plan:
     """What is trained, and how long.
 
     Attributes:
-        algorithm: "ppo", "recurrent-ppo", "sac", "td3" or "tqc", or a name that is registered with
-            `usm_agents.learning.learner`, or "module:name" of one that the module registers; the
-            module is imported when the training begins.
+        algorithm: "ppo", "recurrent-ppo", "sac", "td3", "tqc" or "estimator", or a name that is
+            registered with `usm_agents.learning.learner`, or "module:name" of one that the module
+            registers; the module is imported when the training begins.
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, 1e-6 to 1000 N and N m.
-        action: What the action is: "wrench" or "thrusters".
+        action: What the action is: "wrench", "thrusters" or "estimates".
         omit: Entries of the observation that the agent is not shown.
         frames: How many observations it sees at once, 1 to 100.
         conditions: Conditions from which scenarios are sampled.
@@ -74,6 +74,8 @@ class Plan:
         )
         known = [id for id in gym.registry if id.endswith("Residual-v0")]
         require(self.env.removeprefix("usm_agents:") in known, "env", self.env, ", ".join(known))
+        fitting = self.algorithm != "estimator" or self.action == "estimates"
+        require(fitting, "action", self.action, "estimates, for the algorithm estimator")
         require(":" not in self.base, "base", self.base, "an id, or an id with a file of gains")
 
     @property
@@ -102,16 +104,23 @@ class Plan:
             if isinstance(value, tuple):
                 value = ",".join(value)
             if isinstance(value, Conditions):
-                changed = self.record()["conditions"].items()
-                usual = dataclasses.asdict(FIELD)
-                value = json.dumps({k: v for k, v in changed if v != _listed(usual[k])})
+                value = self._conditions()
             words += [f"--{field.name.replace('_', '-')}", str(value)]
         return shlex.join([*words, "--output", output])
 
     def test_command(self, agent: str) -> str:
         """The command that scores the agent as the training does in the end."""
-        chosen = f"--mode {self.mode} --seed {TEST_SEED} --episodes {TEST_EPISODES}"
-        return f"usm evaluate --policies {agent} {chosen}"
+        words = ["usm", "evaluate", "--policies", agent, "--mode", self.mode]
+        if self.conditions != FIELD:
+            words += ["--conditions", self._conditions()]
+        return shlex.join([*words, "--seed", str(TEST_SEED), "--episodes", str(TEST_EPISODES)])
+
+    def _conditions(self) -> str:
+        """The conditions as `--conditions` takes them."""
+        if preset := preset_of(self.conditions):
+            return preset
+        changed, usual = self.record()["conditions"].items(), dataclasses.asdict(FIELD)
+        return json.dumps({k: v for k, v in changed if v != _listed(usual[k])})
 
     def scenario(self, random: np.random.Generator) -> Scenario:
         """Draw a scenario of the training distribution."""

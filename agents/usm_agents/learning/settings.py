@@ -43,4 +43,15 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "sac": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "td3": _REPLAY | {"noise": 0.2} | _FEW,  # standard deviation, independent in each step
     "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
+    # Not of Stable-Baselines3: see `usm_agents.learning.supervised.learner`.
+    "estimator": {
+        "robots": 64,
+        "kept": 5,  # rounds of episodes that are fitted
+        "epochs": 3,
+        "batch": 32,  # robots
+        "window": 50,  # control periods through which gradients go
+        "learning_rate": 2e-3,  # at the start; falls linearly to a tenth over the training
+        "units": 64,
+        "hidden": 64,
+    },
 }

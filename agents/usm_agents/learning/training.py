@@ -81,8 +81,8 @@ def train(
         left = [] if resume else traces(folder)
         name = f"the content of {folder}"
         require(not left, name, ", ".join(left), "nothing of a training, or --resume")
-        write_plan(plan, folder)
         training = Training(plan, folder, report, validation_episodes, test_episodes)
+        write_plan(plan, folder)  # now that nothing of it is refused
         training.run()
         return training.curve
 
@@ -117,6 +117,7 @@ def prepare(plan: Plan, folder: Path) -> TrainingSetup:
         envs=envs,
         episode_seed=episode_seed,
         first_episodes=first_episodes,
+        draw=plan.scenario,
         truth=envs.unwrapped.truth,
         folder=folder,
     )

@@ -21,7 +21,6 @@ from usm_gym.suites import unseen
 from usm_gym.support.seeding import VALIDATION, stream
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
-from usm_gym.task.conditions import FIELD
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import Scenario
@@ -95,7 +94,7 @@ def score_unseen(
     Returns:
         The summary of the scores without the single episodes, and that command.
     """
-    scenarios = unseen(plan.mode, FIELD, TEST_SEED, episodes)
+    scenarios = unseen(plan.mode, plan.conditions, TEST_SEED, episodes)
     summary = evaluate(ResidualPolicy(residual, network), scenarios).summary()
     del summary["per_episode"]
     return {"command": plan.test_command(agent), **summary}

@@ -36,8 +36,9 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 
     ## Observation
 
-    `Box(float32)`: what the base knows, the states of a Kalman filter beside it, and the joint
-    motion in a few numbers; physical value over scale, cut off at its bound. On the base "sta":
+    `Box(float32)`: what the base knows, what the navigator estimates and the nominal plant
+    foresees, and the joint motion in a few numbers; physical value over scale, cut off at its
+    bound. In `field` and on the base "sta":
 
     OBSERVATION_TABLE
     """
@@ -134,6 +135,13 @@ class ResidualVectorEnv(
         """What the task adds to the plain environment."""
         return self._residual
 
+    @property
+    def memory(self) -> Memory:
+        """What the task keeps of the robots now."""
+        if self._memory is None:
+            raise gym.error.ResetNeeded("call reset() before anything else")
+        return self._memory
+
     def reset(
         self,
         *,
@@ -169,10 +177,9 @@ class ResidualVectorEnv(
 
     def step(self, actions: Array) -> tuple[Array, Any, Any, Any, dict[str, Any]]:
         """Add residuals to the base's commands for one control period."""
-        if self._memory is None:
-            raise gym.error.ResetNeeded("call reset() before anything else")
+        memory = self.memory
         residual = checked_action(actions, (self.num_envs, self._residual.actions))
-        command, memory = self._residual.command(self._memory, residual)
+        command, memory = self._residual.command(memory, residual)
         observation, rewards, terminated, truncated, info = self.env.step(command)
         # Next-step autoreset: the step of those that were done was their reset.
         start = self._done

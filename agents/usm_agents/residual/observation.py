@@ -11,6 +11,7 @@ from usm_gym.support.validation import require
 
 # How the agent sees the numbers of the base's state that its law declares as `shown`.
 BASE_ENTRIES = {
+    "error": Entry("base_error", 2, "m", 0.002, 0.02, "error, as the base believes"),
     "rate": Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer"),
     "disturbance": Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same"),
     "unmodelled": Entry(

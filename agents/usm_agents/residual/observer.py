@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from usm_baselines.estimation.prediction import AXES, NAMES
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Signals
 
@@ -198,18 +199,24 @@ class ResidualObserver:
         actions: int,
         omit: tuple[str, ...],
         frames: int,
+        corrects: bool,
     ) -> None:
-        """Take the base, whose state is shown, and the layout of the plain observation."""
+        """Take the base, whose state is shown, or its estimates to an agent that corrects them."""
         law = base if isinstance(base, ScriptedPolicy) else None
-        entries = base_entries(law.shown) if law else ()
-        columns = [law.columns[name] for name in law.shown] if law else []
+        columns: dict[str, NDArray[np.int64]] = {}
+        if law is not None and corrects:
+            first = law.predictor_columns.start + len(NAMES) * np.arange(AXES, dtype=np.int64)
+            columns = {name: first + k for k, name in enumerate(NAMES)}
+        elif law is not None:
+            columns = {name: law.columns[name] for name in law.shown}
+        entries = base_entries(columns)
         self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
         whole = ResidualLayout(plain.thrusters, actions, entries)
         numbers, slices = np.arange(whole.size), whole.slices
         places = [numbers[slices[entry.name]] for entry in entries]
         self._table = FrameTable(
             starts=np.array([slices[name].start for name in ENTRY._fields]),
-            base=np.array([places, columns], np.int64).reshape(2, -1).T.copy(),
+            base=np.array([places, list(columns.values())], np.int64).reshape(2, -1).T.copy(),
             shown=np.concatenate([numbers[slices[entry.name]] for entry in self.layout.frame]),
             scale=self.layout.scale,
             bound=self.layout.bound,

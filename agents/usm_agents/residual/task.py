@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 from usm_baselines.contender import contender
 from usm_baselines.estimation.estimator import Estimator
+from usm_baselines.estimation.prediction import NAMES
 
 from usm_agents.residual.observer import ResidualObserver
 from usm_gym.kernels.compile import compiled
@@ -19,13 +20,17 @@ from usm_gym.policy import Policy
 from usm_gym.support.validation import Count, Number, is_whole, require
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.observation import ObservationLayout
+from usm_gym.world import world_of
 
 Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
-ActionKind = Literal["wrench", "thrusters"]
+ActionKind = Literal["wrench", "thrusters", "estimates"]
 # The limit of a thruster: less slows learning down, more buys error with chattering.
 RESIDUAL_SCALE = 20.0
+# The largest corrections of error, rate and disturbance over the standard deviation of a measured
+# position (1, 1/s, 1/s^2), which is taken to be no less than so many metres.
+LARGEST_CORRECTION, LEAST_DEVIATION = (10.0, 80.0, 400.0), 5e-5
 # N and N m: the limit of the strongest thruster that conditions allow.
 LEAST_RESIDUAL, LARGEST_RESIDUAL = 1e-6, 1000.0
 MOST_FRAMES = 100
@@ -45,6 +50,9 @@ class Memory(NamedTuple):
         estimator_state: State of the Kalman filter beside it, (batch, numbers).
         frames: Earlier frames of the observation, physical values, (batch, numbers).
         action: The agent's last action, (batch, actions).
+        observation: The plain observation, (batch, numbers).
+        start: Where an episode starts, (batch,).
+        before: State of the base before it acted.
     """
 
     limit: NDArray[np.float64]
@@ -54,6 +62,9 @@ class Memory(NamedTuple):
     estimator_state: NDArray[np.float64]
     frames: NDArray[np.float64]
     action: Array
+    observation: Array
+    start: Flags
+    before: Any
 
 
 @compiled
@@ -79,6 +90,8 @@ class Residual:
         nominal: What is known of the robot.
         layout: Layout of the agent's observation.
         actions: How many numbers an action has.
+        corrects: Whether the agent corrects the estimates that the base acts on.
+        correction: The largest corrections of error, rate and disturbance, m, m/s, m/s^2, (3,).
     """
 
     def __init__(
@@ -97,7 +110,8 @@ class Residual:
             base: The base policy: a name as `--policies` takes it, or the policy itself.
             residual_scale: Largest residual force per axis or per thruster, N, and largest
                 residual moment, N m; 1e-6 to 1000.
-            action: "wrench" or "thrusters".
+            action: What the agent's answer is added to: the "wrench" or the forces of the
+                "thrusters" that the base commands, or the "estimates" that it acts on.
             omit: Entries of the observation that the agent is not shown, by name.
             frames: How many observations the agent sees at once, the latest last, 1 to 100.
 
@@ -124,10 +138,20 @@ class Residual:
         plain = ObservationLayout(nominal.robot.links, len(nominal.robot.thrusters))
         self._limit = plain.slices["thruster_limit"].start
         self._limit_scale = plain.scale[self._limit]
-        self.actions = 3 if action == "wrench" else plain.thrusters
+        self.corrects = action == "estimates"
+        if self.corrects:
+            estimating = getattr(base, "predictor", None) is not None
+            require(estimating, "base", base, "a law that estimates by the plant, to be corrected")
+        axes = len(world_of(nominal.robot).axes)
+        numbers = {"wrench": 3, "thrusters": plain.thrusters, "estimates": 3 * axes}
+        self.actions = numbers[action]
         self._estimator = Estimator(nominal)
-        self._observer = ResidualObserver(base, plain, self.actions, tuple(omit), frames)
+        self._observer = ResidualObserver(
+            base, plain, self.actions, tuple(omit), frames, self.corrects
+        )
         self.layout = self._observer.layout
+        deviation = max(nominal.position_noise, LEAST_DEVIATION)
+        self.correction = deviation * np.array(LARGEST_CORRECTION)
 
     @property
     def action_space(self) -> gym.Space[Array]:
@@ -156,8 +180,11 @@ class Residual:
         else:
             base_state, filtered = memory.base_state, memory.estimator_state
             action, past = memory.action, memory.frames
-        base_action, base_state = self.base.predict(observation, base_state, start, True)
+        before = base_state
+        base_action, base_state = self.base.predict(observation, before, start, True)
         base_action = np.ascontiguousarray(base_action, np.float32)
+        if before is None and base_state is not None and self.corrects:
+            before = np.zeros_like(base_state)
         signals, estimates, innovation, filtered = self._estimator.update(
             observation, filtered, start
         )
@@ -166,7 +193,16 @@ class Residual:
         )
         limit = observation[:, self._limit] * self._limit_scale
         return seen, Memory(
-            limit, signals.allocation, base_action, base_state, filtered, frames, action
+            limit,
+            signals.allocation,
+            base_action,
+            base_state,
+            filtered,
+            frames,
+            action,
+            observation,
+            start,
+            before if self.corrects else None,
         )
 
     def command(self, memory: Memory, action: Array) -> tuple[Array, Memory]:
@@ -180,6 +216,12 @@ class Residual:
             Thruster commands over the limit, (batch, thrusters), and what to keep.
         """
         action = action.clip(-1.0, 1.0)
+        if self.corrects:
+            correction = self.correction * action.reshape(len(action), -1, len(NAMES))
+            command, base_state = self.base.predict(  # type: ignore[call-arg]
+                memory.observation, memory.before, memory.start, True, correction=correction
+            )
+            return command, memory._replace(action=action, base_state=base_state)
         command = np.empty_like(memory.base_action)
         correct_all(
             memory.base_action,

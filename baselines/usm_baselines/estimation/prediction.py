@@ -261,12 +261,15 @@ def update_late(signals, nominal, nav, transition, blocks, state):
 
 
 @compiled
-def read_ahead(observation, nominal, time, blocks, ahead):
-    """Read (error, rate) of a batch off its blocks, `time` after the observations."""
-    for b in range(observation.shape[0]):
-        for axis in range(AXES):
-            block, lane = blocks[b // WIDTH], b % WIDTH
-            ahead[b, axis] = error_ahead(observation[b], nominal, time, axis, block, lane)
+def hold_all(observation, nominal, blocks, ahead):
+    """Hold the commands of a batch; fills in (error, rate) after each period."""
+    for i in range(ahead.shape[0]):
+        advance_all(blocks, nominal.plant)
+        time = (i + 1) * nominal.h
+        for b in range(observation.shape[0]):
+            for axis in range(AXES):
+                block, lane = blocks[b // WIDTH], b % WIDTH
+                ahead[i, b, axis] = error_ahead(observation[b], nominal, time, axis, block, lane)
 
 
 @piece
@@ -277,6 +280,29 @@ def held_force(signals, model, belief, b, axis):
         share = signals.allocation[b, axis, j] * belief[THRUSTER_GAINS + j]
         force += share * commanded(signals.observation[b], model, j)
     return force
+
+
+@compiled
+def tell(signals, mass, state):
+    """Fill in the estimates among the signals from the state of a predictor, (batch, size)."""
+    for b in range(signals.y.shape[0]):
+        for axis in range(AXES):
+            first, thrust = len(NAMES) * axis, 0.0
+            signals.y[b, axis] = state[b, first]
+            signals.rate[b, axis] = state[b, first + 1]
+            signals.disturbance[b, axis] = state[b, first + 2]
+            for j in range(signals.allocation.shape[2]):
+                thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
+            signals.thrust[b, axis] = thrust / mass
+
+
+def believed(signals: Signals, state: Array) -> Array:
+    """The state of a predictor with the estimates that are among the signals."""
+    changed, each = state.copy(), len(NAMES)
+    changed[:, 0:ESTIMATES:each] = signals.y
+    changed[:, 1:ESTIMATES:each] = signals.rate
+    changed[:, 2:ESTIMATES:each] = signals.disturbance
+    return changed
 
 
 class Predictor:
@@ -315,7 +341,9 @@ class Predictor:
 
     def beliefs(self, state: Array) -> Array:
         """What the robots of a batch are believed to be, (batch, numbers): here the nominal one."""
-        return np.tile(self._neutral, (len(state), 1))
+        beliefs = np.empty((len(state), self._neutral.size))
+        beliefs[:] = self._neutral
+        return beliefs
 
     def estimate(self, signals: Signals, state: Array) -> None:
         """Bring the state, (batch, size), to the present, in place."""
@@ -327,6 +355,25 @@ class Predictor:
             transition = transition_of(self._linear, ESTIMATES)
             update_late(signals, self._nominal, self._filter, transition, blocks, state)
 
+    def miss(self, signals: Signals, state: Array, rate: Array) -> Array:
+        """What the plant, as it was believed to be, has left out over the past period.
+
+        Args:
+            signals: What was measured and applied.
+            state: State of a period ago, the true errors and rates among its estimates and a
+                disturbance of 0, (batch, size).
+            rate: True rates of the error now, m/s, (batch, axes).
+
+        Returns:
+            The mean acceleration that was left out, m/s^2, (batch, axes).
+        """
+        blocks = self._blocks(signals, state, past=True)
+        advance_all(blocks, self._nominal.plant)
+        moved = state.copy()
+        update(signals, self._nominal, np.zeros((AXES, len(NAMES))), blocks, moved)
+        missed: Array = (rate - moved[:, 1:ESTIMATES:3]) / self._nominal.h
+        return missed
+
     def foresee(self, signals: Signals, state: Array, periods: int) -> Array:
         """Where estimated robots go if their last commands are held.
 
@@ -336,9 +383,7 @@ class Predictor:
         seen = signals.observation
         blocks = self._blocks(signals, state, past=False)
         ahead = np.empty((periods, len(seen), 2, 2))
-        for i in range(periods):
-            advance_all(blocks, self._nominal.plant)
-            read_ahead(seen, self._nominal, (i + 1) * self._nominal.h, blocks, ahead[i])
+        hold_all(seen, self._nominal, blocks, ahead)
         return ahead
 
     def _blocks(self, signals: Signals, state: Array, past: bool) -> Array:
@@ -346,34 +391,3 @@ class Predictor:
         blocks = np.zeros((-(-len(seen) // WIDTH), self._nominal.row.size * WIDTH))
         place_all(seen, self._nominal, state, past, self.beliefs(state), blocks)
         return blocks
-
-
-class PlantNavigator:
-    """A navigator as `navigator.Navigator`, but by the nominal plant.
-
-    Attributes:
-        size: Numbers of memory for each robot, those of a `Predictor`.
-    """
-
-    def __init__(
-        self, nominal: Nominal, acceleration_noise: float, disturbance_noise: float
-    ) -> None:
-        """Set up the filter; arguments as of `Predictor`."""
-        self._predictor = Predictor(nominal, acceleration_noise, disturbance_noise)
-        self._thrusters = slice(ESTIMATES, ESTIMATES + len(nominal.robot.thrusters))
-        self.size = self._predictor.size
-
-    def estimate(self, signals: Signals, mass: float, memory: Array) -> None:
-        """Predict by the nominal plant and take in what has arrived, in place.
-
-        Args:
-            signals: What was measured and applied; error, rate, disturbance and thrust are filled
-                in.
-            mass: Total mass, kg.
-            memory: Memory of the batch, (batch, size); zero at the start.
-        """
-        self._predictor.estimate(signals, memory)
-        estimates = memory[:, :ESTIMATES].reshape(-1, AXES, len(NAMES))
-        signals.y[:], signals.rate[:], signals.disturbance[:] = np.moveaxis(estimates, 2, 0)
-        T, forces = signals.allocation[:, :AXES], memory[:, np.newaxis, self._thrusters]
-        signals.thrust[:] = (T * forces).sum(axis=2) / mass

@@ -74,8 +74,10 @@ class AdaptiveLQG(JointLQG):
             named |= {name: beliefs[:, part], f"{name}_std": uncertainty[:, part]}
         return named
 
-    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
-        action = super()._act(observation, state)
+    def _act(
+        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
+    ) -> NDArray[np.float32]:
+        action = super()._act(observation, state, correction)
         return compensated(action, self._identifier.beliefs(state[:, self._own :]))
 
 

@@ -65,5 +65,7 @@ class InformedLQG(PrivilegedPolicy, JointLQG):
             self._scenarios = snapshot.scenarios
             self._told.tell(snapshot.scenarios)
 
-    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
-        return compensated(super()._act(observation, state), self._told.truth)
+    def _act(
+        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
+    ) -> NDArray[np.float32]:
+        return compensated(super()._act(observation, state, correction), self._told.truth)

@@ -13,7 +13,7 @@ import numpy as np
 
 from usm_baselines.estimation import kalman, prediction
 from usm_baselines.estimation.kalman import DISTURBANCE, ERROR, RATE, STATES, THRUST
-from usm_baselines.estimation.prediction import ESTIMATES, Predictor, held_force
+from usm_baselines.estimation.prediction import ESTIMATES, Predictor, believed, held_force
 from usm_baselines.laws.lqg import LQG, regulate
 from usm_baselines.policy import HEADING_GAIN
 from usm_baselines.signals import Array, Signals
@@ -94,7 +94,7 @@ class JointLQG(LQG):
         """Compute the gains of filter and regulator; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
         self._periods = max(1, round(self.gains.lead / nominal.control_period))
-        self._predictor = self._make_predictor(nominal)
+        self.predictor: Predictor = self._make_predictor(nominal)
 
     def _make_predictor(self, nominal: Nominal) -> Predictor:
         return Predictor(nominal, *self.densities)
@@ -102,11 +102,11 @@ class JointLQG(LQG):
     @cached_property
     def law_shape(self) -> tuple[int, ...]:
         """The state of the predictor."""
-        return (self._predictor.size,)
+        return (self.predictor.size,)
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
-        """Estimate, foresee, regulate."""
-        self._predictor.estimate(signals, state)
-        ahead = self._predictor.foresee(signals, state, self._periods)
-        beliefs = self._predictor.beliefs(state)
-        joint_lqg(signals, self._model, self._linear, self._gain, state, beliefs, ahead, force)
+        """Foresee, regulate."""
+        known = believed(signals, state)
+        ahead = self.predictor.foresee(signals, known, self._periods)
+        beliefs = self.predictor.beliefs(state)
+        joint_lqg(signals, self._model, self._linear, self._gain, known, beliefs, ahead, force)

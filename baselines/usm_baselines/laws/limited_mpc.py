@@ -18,6 +18,7 @@ import numpy as np
 
 from usm_baselines.allocation import QUADRATIC_PROGRAM
 from usm_baselines.estimation import kalman
+from usm_baselines.estimation.prediction import believed
 from usm_baselines.laws.mpc import MPC
 from usm_baselines.planning import Foreseen, improve, problem_of
 from usm_baselines.signals import Array, Signals, commanded, physical
@@ -86,9 +87,8 @@ class LimitedMPC(MPC):
         )
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
-        """Estimate, foresee, plan within the limits."""
-        self._predictor.estimate(signals, state)
-        ahead = self._predictor.foresee(signals, state, self._periods)
+        """Foresee, plan within the limits."""
+        ahead = self.predictor.foresee(signals, believed(signals, state), self._periods)
         size, thrusters, axes = len(force), self._model.thrusters, self._model.axes
         plan, limit = np.empty((size, self._periods, thrusters)), np.empty(size)
         foreseen = Foreseen(

@@ -21,7 +21,7 @@ import numpy as np
 
 from usm_baselines.estimation import kalman, prediction
 from usm_baselines.estimation.kalman import COMMAND, ERROR, RATE, THRUST
-from usm_baselines.estimation.prediction import Predictor, held_force
+from usm_baselines.estimation.prediction import Predictor, believed, held_force
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
 from usm_baselines.signals import Array, Signals
 from usm_baselines.space import Gain
@@ -111,7 +111,7 @@ class MPC(ScriptedPolicy):
         linear = kalman.linear_model(nominal, *densities)
         self._periods = max(1, round(self.gains.horizon / nominal.control_period))
         self._inertia = linear.inertia
-        self._predictor = Predictor(nominal, *densities)
+        self.predictor: Predictor = Predictor(nominal, *densities)
         weights = self.gains.variation_weight * linear.inertia
         self._gain = np.stack(
             [
@@ -123,11 +123,11 @@ class MPC(ScriptedPolicy):
     @cached_property
     def law_shape(self) -> tuple[int, ...]:
         """The state of the predictor."""
-        return (self._predictor.size,)
+        return (self.predictor.size,)
 
     def control(self, signals: Signals, state: Array, force: Array) -> None:
-        """Estimate, foresee, correct."""
-        self._predictor.estimate(signals, state)
-        ahead = self._predictor.foresee(signals, state, self._periods)
-        beliefs = self._predictor.beliefs(state)
+        """Foresee, correct."""
+        known = believed(signals, state)
+        ahead = self.predictor.foresee(signals, known, self._periods)
+        beliefs = self.predictor.beliefs(state)
         receding(signals, self._model, self._inertia, self._gain, beliefs, ahead, force)

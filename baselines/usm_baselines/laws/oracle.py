@@ -83,7 +83,9 @@ class Oracle(PrivilegedPolicy):
         """Run ahead from the true state."""
         self._copy = self._copy_of(snapshot)
 
-    def _act(self, observation: NDArray[np.float32], state: Array) -> NDArray[np.float32]:
+    def _act(
+        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
+    ) -> NDArray[np.float32]:
         """Carry the plan on by a period, see what comes of it, correct it."""
         copy: Any = self._copy
         own = state[:, self._own :]

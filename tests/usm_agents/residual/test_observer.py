@@ -97,7 +97,7 @@ def test_every_entry_of_the_table_is_filled_in_to_the_bit(base, robot):
 
 
 def test_a_base_may_not_show_what_has_no_entry():
-    with pytest.raises(ValueError, match="shown is 'mood'; allowed: rate, disturbance"):
+    with pytest.raises(ValueError, match="shown is 'mood'; allowed: error, rate"):
         base_entries(["rate", "mood"])
 
 

@@ -1,0 +1,1 @@
+"""Learning of what to believe, from what the simulation knows."""
