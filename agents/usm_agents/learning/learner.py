@@ -166,6 +166,8 @@ def _algorithm(name: str) -> Algorithm:
     return _algorithms[registered]
 
 
-LEARNERS = {"estimator": "usm_agents.learning.supervised.learner:EstimatorLearner"}
 for _name, _settings in SETTINGS.items():
-    register(_name, LEARNERS.get(_name, "usm_agents.learning.sb3.learner:SB3Learner"), _settings)
+    _learner = (
+        "supervised.learner:EstimatorLearner" if _name == "estimator" else "sb3.learner:SB3Learner"
+    )
+    register(_name, f"usm_agents.learning.{_learner}", _settings)
