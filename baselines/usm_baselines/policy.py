@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,18 @@ from usm_gym.world import world_of
 # The gain of the heading controller, which all laws share: it is tuned for none of them, so that
 # none buys position with heading.
 HEADING_GAIN = Gain(100.0, "N m/rad", "heading gain k_psi")
+
+
+class Percept(NamedTuple):
+    """What a law knows of a batch of robots before it acts.
+
+    Attributes:
+        signals: What was measured and estimated.
+        state: The law's state, brought to the present, (batch, numbers).
+    """
+
+    signals: Signals
+    state: Array
 
 
 class ScriptedPolicy:
@@ -197,35 +209,61 @@ class ScriptedPolicy:
             seen.shape,
             f"({numbers},) or (batch, {numbers})",
         )
-        batch = seen.reshape(-1, numbers)
-        new_state = self._state(len(batch), state, episode_start)
-        action = self._act(batch, new_state, correction)
+        known = self.perceive(seen.reshape(-1, numbers), state, episode_start)
+        action, new_state = self.decide(known, correction)
         return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
 
-    def _act(
-        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
-    ) -> NDArray[np.float32]:
+    def perceive(
+        self, observation: NDArray[np.float32], state: Array | None, start: ArrayLike | None
+    ) -> Percept:
+        """The first half of `predict`: take in a batch of observations, and estimate.
+
+        Args:
+            observation: Observations, (batch, numbers).
+            state: What the last call returned; None at the start.
+            start: Where an episode starts, bool, a scalar or (batch,).
+        """
         size = len(observation)
+        state = self._state(size, state, start)
         navigated = self._navigator is not None
         signals = signals_of(observation, self._model, self._world, navigated)
         sense(state, self._model, signals)
         own = state[:, self._own :].copy().reshape(size, *self.law_shape)
         self.estimate(signals, state[:, self._shared : self._own], own)
+        state[:, self._own :] = own.reshape(size, -1)
+        return Percept(signals, state)
+
+    def decide(
+        self, known: Percept, correction: Array | None = None
+    ) -> tuple[NDArray[np.float32], Array]:
+        """The second half: act on what is known, which stays as it is.
+
+        Args:
+            known: What `perceive` returned.
+            correction: As of `predict`.
+
+        Returns:
+            Commands, (batch, thrusters), and the state for the next call.
+        """
+        signals, state = known.signals, known.state.copy()
+        size = len(state)
         if correction is not None:
-            signals.y[:] += correction[:, :, 0]
-            signals.rate[:] += correction[:, :, 1]
-            signals.disturbance[:] += correction[:, :, 2]
+            signals = signals._replace(
+                y=signals.y + correction[:, :, 0],
+                rate=signals.rate + correction[:, :, 1],
+                disturbance=signals.disturbance + correction[:, :, 2],
+            )
+        own = state[:, self._own :].copy().reshape(size, *self.law_shape)
         force = np.empty_like(signals.y)
         self.control(signals, own, force)
         state[:, self._own :] = own.reshape(size, -1)
         action = np.empty((size, self._model.thrusters), np.float32)
-        gain = self.gains.heading_gain
-        act(observation, state, self._model, signals.allocation, force, gain, action)
-        if not self._within_limits:
-            return action
-        model = self._model
-        limit = model.scale[model.thruster_limit] * observation[:, model.thruster_limit]
-        return within(action, limit, model.dead_band, signals.allocation)
+        gain, model = self.gains.heading_gain, self._model
+        act(signals.observation, state, model, signals.allocation, force, gain, action)
+        if self._within_limits:
+            limit = model.scale[model.thruster_limit] * signals.observation[:, model.thruster_limit]
+            action = within(action, limit, model.dead_band, signals.allocation)
+        return action, state
 
     def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:
         numbers = self._own + math.prod(self.law_shape)

@@ -11,17 +11,17 @@ from typing import Any
 REWARD_SCALE = 0.1
 
 _PPO: dict[str, Any] = {
-    "hidden": (128, 128),  # widths of the hidden layers
-    "n_steps": 64,
+    "hidden": (64, 64),  # widths of the hidden layers
+    "n_steps": 16,
     "batch_size": 1024,
-    "n_epochs": 6,
-    "learning_rate": 5e-4,  # at the start; falls linearly to a tenth over the training
-    "gamma": 0.97,
-    "gae_lambda": 0.95,
+    "n_epochs": 4,
+    "learning_rate": 1e-3,  # at the start; falls linearly to a tenth over the training
+    "gamma": 0.93,
+    "gae_lambda": 0.9,
     "target_kl": 0.03,
     "log_std_init": -1.5,  # small exploration around the base
 }
-_RECURRENT = _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_epochs": 4}  # LSTM units
+_RECURRENT = _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_steps": 64}  # LSTM units
 _REPLAY: dict[str, Any] = {
     "hidden": (64, 64),
     "learning_rate": 5e-4,
@@ -43,15 +43,14 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "sac": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "td3": _REPLAY | {"noise": 0.2} | _FEW,  # standard deviation, independent in each step
     "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
-    # Not of Stable-Baselines3: see `usm_agents.learning.supervised.learner`.
     "estimator": {
         "robots": 64,
-        "kept": 5,  # rounds of episodes that are fitted
+        "kept": 5,  # rounds that are fitted
         "epochs": 3,
         "batch": 32,  # robots
-        "window": 50,  # control periods through which gradients go
+        "window": 50,  # periods through which gradients go
         "learning_rate": 2e-3,  # at the start; falls linearly to a tenth over the training
-        "units": 64,
+        "units": 64,  # LSTM units
         "hidden": 64,
     },
 }

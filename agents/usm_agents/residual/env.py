@@ -160,8 +160,7 @@ class ResidualVectorEnv(
             assert self._memory is not None
             seen, memory = self._residual.observe(observation, self._memory, which)
             self._seen = _chosen(which, seen, self._seen)
-            pairs = zip(memory, self._memory, strict=True)
-            self._memory = Memory(*(_chosen(which, new, old) for new, old in pairs))
+            self._memory = _chosen(which, memory, self._memory)
         self._done = np.zeros(self.num_envs, bool)
         return self._seen.copy(), info
 
@@ -227,6 +226,9 @@ def _made_for(nominal: Nominal, current: Residual, arguments: Mapping[str, Any])
 
 
 def _chosen(which: Flags, new: Any, old: Any) -> Any:
-    if old is None:  # a policy without state
+    if isinstance(new, tuple):
+        pairs = zip(new, old, strict=True)
+        return type(new)(*(_chosen(which, now, before) for now, before in pairs))
+    if old is None or isinstance(new, bool):  # a policy without state; what is the same for all
         return new
     return np.where(which.reshape(-1, *[1] * (new.ndim - 1)), new, old)

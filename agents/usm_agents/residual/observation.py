@@ -6,12 +6,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from usm_baselines.estimation.estimator import LEADS
+
 from usm_gym.sensors import Entry, Layout
 from usm_gym.support.validation import require
 
+# Scale of a position error, m, or where positions are measured worse than in `field`, so many of
+# their standard deviations.
+SHORT, DEVIATIONS = 2e-3, 5.0
+
 # How the agent sees the numbers of the base's state that its law declares as `shown`.
 BASE_ENTRIES = {
-    "error": Entry("base_error", 2, "m", 0.002, 0.02, "error, as the base believes"),
+    "error": Entry("base_error", 2, "m", SHORT, 10 * SHORT, "error, as the base believes"),
     "rate": Entry("base_rate", 2, "m/s", 0.05, 1.0, "rate of the error, by the base's observer"),
     "disturbance": Entry("base_disturbance", 2, "m/s^2", 2.0, 40.0, "disturbance, by the same"),
     "unmodelled": Entry(
@@ -41,6 +47,7 @@ class ResidualLayout(Layout):
         thrusters: Number of thrusters.
         actions: Number of numbers in an action.
         base: Entries of the base's own state.
+        length: What a position error is measured by, m.
         omit: Names of entries that are left out.
         frames: How many observations are shown at once, the latest last.
     """
@@ -48,6 +55,7 @@ class ResidualLayout(Layout):
     thrusters: int
     actions: int
     base: tuple[Entry, ...]
+    length: float = SHORT
     omit: tuple[str, ...] = ()
     frames: int = 1
 
@@ -62,15 +70,29 @@ class ResidualLayout(Layout):
     @property
     def complete(self) -> tuple[Entry, ...]:
         """All entries that a frame can have, in order."""
+        length = self.length
         return (
-            Entry("position_error", 2, "m", 0.002, 0.02, "as measured (x, y)"),
+            Entry("position_error", 2, "m", length, 10 * length, "as last measured (x, y)"),
+            Entry("position_age", 1, "s", 0.1, 10.0, "how old that is"),
+            Entry("velocity_age", 1, "s", 0.1, 10.0, "how old the last velocity is; -1 if none"),
             Entry("reference_velocity", 2, "m/s", 0.1, 1.0, "velocity of the reference (x, y)"),
             Entry("reference_acceleration", 2, "m/s^2", 0.02, 0.2, "its acceleration"),
-            Entry("estimated_error", 2, "m", 0.002, 0.02, "error, by the Kalman filter"),
+            Entry("estimated_error", 2, "m", length, 10 * length, "error, by the navigator"),
             Entry("estimated_rate", 2, "m/s", 0.04, 0.4, "its rate, by the same"),
             Entry("estimated_disturbance", 2, "m/s^2", 0.2, 4.0, "disturbance, by the same"),
-            Entry("estimated_thrust", 2, "m/s^2", 1.0, 20.0, "thrust over inertia, by the same"),
-            Entry("innovation", 2, "m", 2e-4, 4e-3, "measurement less its prediction, by the same"),
+            Entry("estimated_thrust", 2, "m/s^2", 1.0, 20.0, "thrust over mass, by the same"),
+            *(
+                Entry(
+                    f"foreseen_error_{lead}",
+                    2,
+                    "m",
+                    length,
+                    10 * length,
+                    f"error in {lead} periods if the last commands are held",
+                )
+                for lead in LEADS
+            ),
+            Entry("foreseen_rate", 2, "m/s", 0.04, 0.4, "rate of the last of these"),
             *self.base,
             Entry("base_force", 2, "N", 40.0, 400.0, "the base's force, before saturation"),
             Entry("base_moment", 1, "N m", 5.0, 100.0, "the base's moment, before saturation"),

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import namedtuple
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.estimation.prediction import AXES, NAMES
+from usm_baselines.estimation.estimator import LEADS, Estimate
+from usm_baselines.estimation.prediction import NAMES
 from usm_baselines.policy import ScriptedPolicy
-from usm_baselines.signals import Signals
 
 from usm_agents.residual.observation import ResidualLayout, base_entries
-from usm_gym.kernels.compile import compiled, piece, shared
+from usm_gym.kernels.compile import compiled, piece
 from usm_gym.policy import Policy
 from usm_gym.sensors import value
 from usm_gym.task.observation import ENTRY as PLAIN
@@ -24,6 +25,8 @@ Flags = NDArray[np.bool_]
 # The entries that do not depend on the base, by name: their numbers in the order of the table.
 _NAMES = [entry.name for entry in ResidualLayout(thrusters=1, actions=1, base=()).complete]
 ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
+WRENCH = ("base_force", "base_moment")
+FORESEEN = _NAMES.index(f"foreseen_error_{LEADS[0]}")  # the others follow
 
 
 class Plain(NamedTuple):
@@ -58,123 +61,100 @@ class FrameTable(NamedTuple):
     complete: int
 
 
-# The shipped agents were trained on sums as numpy.sum and numpy.einsum make them. Their order is
-# kept here, and that they are never -0.0: what an agent sees has the same bits.
-
-
-@shared
-def unsigned(total):
-    """A sum without the sign of its zero; not a `piece`, whose flags let the compiler drop this."""
-    return abs(total) if total == 0.0 else total
+@piece
+def over_joints(seen, plain, entry, joints):
+    """Sum of a quantity over the joints."""
+    total = 0.0
+    for i in range(joints):
+        total += value(seen, plain, entry, i)
+    return total
 
 
 @piece
-def add_up(terms):
-    """The sum of `terms`, which it overwrites, pairwise."""
-    first = 1
-    if terms.size >= 8:
-        first = terms.size // 8 * 8
-        for i in range(8, first):
-            terms[i % 8] += terms[i]
-        for step in (1, 2, 4):
-            for i in range(0, 8, 2 * step):
-                terms[i] += terms[i + step]
-    for i in range(first, terms.size):
-        terms[0] += terms[i]
-    return unsigned(terms[0])
-
-
-@piece
-def over_joints(seen, plain, entry, terms):
-    """Sum of a quantity over the joints; `terms` is room for one number per joint."""
-    for i in range(terms.size):
-        terms[i] = value(seen, plain, entry, i)
-    return add_up(terms)
-
-
-@piece
-def tail_over_mean(seen, plain, entry, terms):
+def tail_over_mean(seen, plain, entry, joints):
     """The tail's angle over the mean of all links', from the joints' angles; of rates likewise.
 
     Joint i turns the links after it.
     """
-    joints = terms.size
+    total = 0.0
     for i in range(joints):
-        terms[i] = (joints - i) / (joints + 1) * value(seen, plain, entry, i)
-    return add_up(terms)
+        total += (joints - i) / (joints + 1) * value(seen, plain, entry, i)
+    return total
 
 
 @piece
-def fill_axes(frame, starts, signals, estimates, innovation, b):
-    """Fill in what is measured and estimated, axis by axis."""
+def fill_axes(frame, starts, seen, plain, signals, ahead, b):
+    """Fill in what is measured, estimated and foreseen, axis by axis."""
+    frame[starts[ENTRY.position_age]] = value(seen, plain, PLAIN.position_age, 0)
+    frame[starts[ENTRY.velocity_age]] = value(seen, plain, PLAIN.velocity_age, 0)
     for axis in range(signals.y.shape[1]):
-        error, rate, disturbance, thrust = estimates[b, axis]
-        frame[starts[ENTRY.position_error] + axis] = signals.y[b, axis]
+        error = value(seen, plain, PLAIN.position_error, axis)
+        frame[starts[ENTRY.position_error] + axis] = error
         frame[starts[ENTRY.reference_velocity] + axis] = signals.velocity[b, axis]
         frame[starts[ENTRY.reference_acceleration] + axis] = signals.acceleration[b, axis]
-        frame[starts[ENTRY.estimated_error] + axis] = error
-        frame[starts[ENTRY.estimated_rate] + axis] = rate
-        frame[starts[ENTRY.estimated_disturbance] + axis] = disturbance
-        frame[starts[ENTRY.estimated_thrust] + axis] = thrust
-        frame[starts[ENTRY.innovation] + axis] = innovation[b, axis]
+        frame[starts[ENTRY.estimated_error] + axis] = signals.y[b, axis]
+        frame[starts[ENTRY.estimated_rate] + axis] = signals.rate[b, axis]
+        frame[starts[ENTRY.estimated_disturbance] + axis] = signals.disturbance[b, axis]
+        frame[starts[ENTRY.estimated_thrust] + axis] = signals.thrust[b, axis]
+        for lead in range(ahead.shape[0]):
+            frame[starts[FORESEEN + lead] + axis] = ahead[lead, b, axis, 0]
+        frame[starts[ENTRY.foreseen_rate] + axis] = ahead[-1, b, axis, 1]
 
 
 @piece
 def fill_wrench(frame, starts, seen, plain, T, action):
-    """Fill in the wrench that the base asks for, thrusters of even and odd place added up apart."""
+    """Fill in the wrench that the base asks for."""
     limit = value(seen, plain, PLAIN.thruster_limit, 0)
     for row in range(3):
-        even, odd = 0.0, 0.0
-        for j in range(0, action.size, 2):
-            even += T[row, j] * (action[j] * limit)
-        for j in range(1, action.size, 2):
-            odd += T[row, j] * (action[j] * limit)
+        total = 0.0
+        for j in range(action.size):
+            total += T[row, j] * (action[j] * limit)
         at = starts[ENTRY.base_force] + row if row < 2 else starts[ENTRY.base_moment]
-        frame[at] = unsigned(even + odd)
+        frame[at] = total
 
 
 @piece
-def fill_posture(frame, starts, seen, plain, terms):
+def fill_posture(frame, starts, seen, plain, joints):
     """Fill in heading and joint motion."""
     tail, rate = value(seen, plain, PLAIN.tail_angle, 0), value(seen, plain, PLAIN.tail_rate, 0)
-    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, PLAIN.joint_angles, terms)
+    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, PLAIN.joint_angles, joints)
     frame[starts[ENTRY.heading_error]] = value(seen, plain, PLAIN.heading_error, 0)
-    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(seen, plain, PLAIN.joint_rates, terms)
-    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, PLAIN.joint_angles, terms)
-    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, PLAIN.joint_rates, terms)
+    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(
+        seen, plain, PLAIN.joint_rates, joints
+    )
+    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, PLAIN.joint_angles, joints)
+    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, PLAIN.joint_rates, joints)
     reference = starts[ENTRY.reference_deflection]
-    frame[reference] = over_joints(seen, plain, PLAIN.joint_references, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_references, joints)
     reference = starts[ENTRY.reference_deflection_rate]
-    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_rates, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_rates, joints)
     reference = starts[ENTRY.reference_deflection_acceleration]
-    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_accelerations, terms)
+    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_accelerations, joints)
     bending = 0.0
-    for i in range(terms.size):
+    for i in range(joints):
         if value(seen, plain, PLAIN.joint_references, i) != 0.0:
             bending += 1.0
     frame[starts[ENTRY.bending_joints]] = bending
 
 
 @compiled
-def show(
-    table, plain, signals, estimates, innovation, action, state, last, start, past, seen, kept
-):
+def show(table, plain, signals, ahead, action, state, last, start, past, seen, kept):
     """Fill in the observations `seen` and the frames `kept` of a batch; see `ResidualObserver`."""
     joints = plain.starts[PLAIN.joint_rates] - plain.starts[PLAIN.joint_angles]
-    frame, terms = np.empty(table.complete), np.empty(joints)
+    frame = np.empty(table.complete)
     starts, width = table.starts, table.shown.size
     for b in range(seen.shape[0]):
         measured = signals.observation[b]
-        fill_axes(frame, starts, signals, estimates, innovation, b)
+        fill_axes(frame, starts, measured, plain, signals, ahead, b)
         for k in range(table.base.shape[0]):
             frame[table.base[k, 0]] = state[b, table.base[k, 1]]
         fill_wrench(frame, starts, measured, plain, signals.allocation[b], action[b])
-        for j in range(action.shape[1]):
+        for j in range(signals.allocation.shape[2]):
             command = value(measured, plain, PLAIN.thruster_command, j)
             frame[starts[ENTRY.thruster_command] + j] = command
         for i in range(last.shape[1]):
             frame[starts[ENTRY.last_action] + i] = 0.0 if start[b] else last[b, i]
-        fill_posture(frame, starts, measured, plain, terms)
+        fill_posture(frame, starts, measured, plain, joints)
         for k in range(seen.shape[1]):
             earlier = k < past.shape[1] and not start[b]
             number = past[b, k] if earlier else frame[table.shown[k % width]]
@@ -197,21 +177,27 @@ class ResidualObserver:
         base: Policy,
         plain: ObservationLayout,
         actions: int,
+        length: float,
         omit: tuple[str, ...],
         frames: int,
         corrects: bool,
     ) -> None:
-        """Take the base, whose state is shown, or its estimates to an agent that corrects them."""
+        """Take the base, whose state or estimates are shown, and what a `ResidualLayout` needs."""
         law = base if isinstance(base, ScriptedPolicy) else None
-        columns: dict[str, NDArray[np.int64]] = {}
+        columns: dict[str, Any] = {}
         if law is not None and corrects:
-            first = law.predictor_columns.start + len(NAMES) * np.arange(AXES, dtype=np.int64)
+            first = law.predictor_columns.start + len(NAMES) * np.arange(2)
             columns = {name: first + k for k, name in enumerate(NAMES)}
         elif law is not None:
             columns = {name: law.columns[name] for name in law.shown}
-        entries = base_entries(columns)
-        self.layout = ResidualLayout(plain.thrusters, actions, entries, omit, frames)
-        whole = ResidualLayout(plain.thrusters, actions, entries)
+        entries = tuple(
+            replace(entry, scale=length, bound=10 * length) if entry.unit == "m" else entry
+            for entry in base_entries(columns)
+        )
+        if corrects:  # the base has not acted yet
+            omit = (*omit, *(name for name in WRENCH if name not in omit))
+        self.layout = ResidualLayout(plain.thrusters, actions, entries, length, omit, frames)
+        whole = ResidualLayout(plain.thrusters, actions, entries, length)
         numbers, slices = np.arange(whole.size), whole.slices
         places = [numbers[slices[entry.name]] for entry in entries]
         self._table = FrameTable(
@@ -227,9 +213,7 @@ class ResidualObserver:
 
     def update(
         self,
-        signals: Signals,
-        estimates: Array,
-        innovation: Array,
+        known: Estimate,
         base_action: NDArray[np.float32],
         base_state: Any,
         last_action: NDArray[np.float32],
@@ -239,9 +223,7 @@ class ResidualObserver:
         """Make the observations of a batch.
 
         Args:
-            signals: What was measured.
-            estimates: (e, v, d, f) per axis by `Estimator`, (batch, 2, 4).
-            innovation: Its innovations, m, (batch, 2).
+            known: What was measured, estimated and foreseen.
             base_action: The base's commands over the limit, not clipped, (batch, thrusters).
             base_state: The base's state after that.
             last_action: The agent's last action, (batch, actions).
@@ -257,9 +239,8 @@ class ResidualObserver:
         show(
             self._table,
             self._plain,
-            signals,
-            estimates,
-            innovation,
+            known.signals,
+            known.ahead,
             base_action,
             base_state if len(self._table.base) else _NOTHING,
             last_action,

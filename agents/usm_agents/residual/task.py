@@ -12,7 +12,9 @@ from pydantic import Field
 from usm_baselines.contender import contender
 from usm_baselines.estimation.estimator import Estimator
 from usm_baselines.estimation.prediction import NAMES
+from usm_baselines.policy import Percept, ScriptedPolicy
 
+from usm_agents.residual.observation import DEVIATIONS, SHORT
 from usm_agents.residual.observer import ResidualObserver
 from usm_gym.kernels.compile import compiled
 from usm_gym.plant.thrusters import allocate
@@ -45,14 +47,13 @@ class Memory(NamedTuple):
     Attributes:
         limit: Thruster limits, N, (batch,).
         allocation: Allocation matrices, (batch, 3, thrusters).
-        base_action: The base's commands over the limit, not clipped, (batch, thrusters).
+        base_action: The base's commands over the limit, not clipped, (batch, thrusters); none
+            where the agent corrects its estimates, since it acts only then.
         base_state: State of the base.
-        estimator_state: State of the Kalman filter beside it, (batch, numbers).
+        estimator_state: State of the estimator beside it, (batch, numbers).
         frames: Earlier frames of the observation, physical values, (batch, numbers).
         action: The agent's last action, (batch, actions).
-        observation: The plain observation, (batch, numbers).
-        start: Where an episode starts, (batch,).
-        before: State of the base before it acted.
+        known: What a base whose estimates are corrected knows before it acts, else None.
     """
 
     limit: NDArray[np.float64]
@@ -62,9 +63,7 @@ class Memory(NamedTuple):
     estimator_state: NDArray[np.float64]
     frames: NDArray[np.float64]
     action: Array
-    observation: Array
-    start: Flags
-    before: Any
+    known: Percept | None
 
 
 @compiled
@@ -90,7 +89,6 @@ class Residual:
         nominal: What is known of the robot.
         layout: Layout of the agent's observation.
         actions: How many numbers an action has.
-        corrects: Whether the agent corrects the estimates that the base acts on.
         correction: The largest corrections of error, rate and disturbance, m, m/s, m/s^2, (3,).
     """
 
@@ -138,16 +136,19 @@ class Residual:
         plain = ObservationLayout(nominal.robot.links, len(nominal.robot.thrusters))
         self._limit = plain.slices["thruster_limit"].start
         self._limit_scale = plain.scale[self._limit]
-        self.corrects = action == "estimates"
-        if self.corrects:
-            estimating = getattr(base, "predictor", None) is not None
+        self._corrected: ScriptedPolicy | None = None
+        if action == "estimates":
+            estimating = isinstance(base, ScriptedPolicy) and base.predictor is not None
             require(estimating, "base", base, "a law that estimates by the plant, to be corrected")
+            assert isinstance(base, ScriptedPolicy)
+            self._corrected = base
         axes = len(world_of(nominal.robot).axes)
         numbers = {"wrench": 3, "thrusters": plain.thrusters, "estimates": 3 * axes}
         self.actions = numbers[action]
         self._estimator = Estimator(nominal)
+        length = max(SHORT, DEVIATIONS * nominal.position_noise)
         self._observer = ResidualObserver(
-            base, plain, self.actions, tuple(omit), frames, self.corrects
+            base, plain, self.actions, length, tuple(omit), frames, action == "estimates"
         )
         self.layout = self._observer.layout
         deviation = max(nominal.position_noise, LEAST_DEVIATION)
@@ -180,29 +181,19 @@ class Residual:
         else:
             base_state, filtered = memory.base_state, memory.estimator_state
             action, past = memory.action, memory.frames
-        before = base_state
-        base_action, base_state = self.base.predict(observation, before, start, True)
-        base_action = np.ascontiguousarray(base_action, np.float32)
-        if before is None and base_state is not None and self.corrects:
-            before = np.zeros_like(base_state)
-        signals, estimates, innovation, filtered = self._estimator.update(
-            observation, filtered, start
-        )
-        seen, frames = self._observer.update(
-            signals, estimates, innovation, base_action, base_state, action, past, start
-        )
+        known: Percept | None = None
+        if self._corrected is not None:
+            known = self._corrected.perceive(observation, base_state, start)
+            base_action, base_state = np.empty((size, 0), np.float32), known.state
+        else:
+            base_action, base_state = self.base.predict(observation, base_state, start, True)
+            base_action = np.ascontiguousarray(base_action, np.float32)
+        estimate = self._estimator.update(observation, filtered, start)
+        seen, frames = self._observer.update(estimate, base_action, base_state, action, past, start)
         limit = observation[:, self._limit] * self._limit_scale
+        allocation, filtered = estimate.signals.allocation, estimate.state
         return seen, Memory(
-            limit,
-            signals.allocation,
-            base_action,
-            base_state,
-            filtered,
-            frames,
-            action,
-            observation,
-            start,
-            before if self.corrects else None,
+            limit, allocation, base_action, base_state, filtered, frames, action, known
         )
 
     def command(self, memory: Memory, action: Array) -> tuple[Array, Memory]:
@@ -216,11 +207,10 @@ class Residual:
             Thruster commands over the limit, (batch, thrusters), and what to keep.
         """
         action = action.clip(-1.0, 1.0)
-        if self.corrects:
+        if self._corrected is not None:
             correction = self.correction * action.reshape(len(action), -1, len(NAMES))
-            command, base_state = self.base.predict(  # type: ignore[call-arg]
-                memory.observation, memory.before, memory.start, True, correction=correction
-            )
+            assert memory.known is not None
+            command, base_state = self._corrected.decide(memory.known, correction)
             return command, memory._replace(action=action, base_state=base_state)
         command = np.empty_like(memory.base_action)
         correct_all(

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.estimation.estimator import Estimator
 from usm_baselines.laws.oracle import Oracle
 
 from usm_agents.artifact.folder import make_agent
@@ -54,17 +53,18 @@ class ForceLog:
         self.total: list[Array] = []
         self.base: list[Array] = []
         self._policy = policy
-        self._estimator = Estimator(nominal)
-        self._estimates: Array | None = None
+        self._world = world_of(nominal.robot)
 
     def predict(
         self, observation: Any, state: Any, start: Any, deterministic: bool = True, **truth: Any
     ) -> tuple[Any, Any]:
         """Act as the policy does."""
         action, state = self._policy.predict(observation, state, start, deterministic, **truth)
-        signals, _, _, self._estimates = self._estimator.update(observation, self._estimates, start)
         memory = state[0] if isinstance(state, tuple) else None
-        forces = signals.allocation[:, : signals.y.shape[1]]
+        axes, angles = len(self._world.axes), len(self._world.attitude)
+        allocation = np.empty((len(observation), axes + angles, self._world.thrusters))
+        self._world.allocate(observation, allocation)
+        forces = allocation[:, :axes]
         self.total.append(np.einsum("bwt,bt->bw", forces, action * self._limit))
         if isinstance(memory, Memory):
             self.base.append(np.einsum("bwt,bt->bw", forces, memory.base_action * self._limit))

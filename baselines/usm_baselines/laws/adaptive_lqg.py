@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from usm_baselines.estimation.identification import Identifier
 from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS
 from usm_baselines.laws.joint_lqg import JointLQG, JointLQGGains
-from usm_baselines.policy import HEADING_GAIN
+from usm_baselines.policy import HEADING_GAIN, Percept
 from usm_baselines.signals import Array
 from usm_baselines.space import Gain, declared
 from usm_gym.task.nominal import Nominal
@@ -74,11 +74,12 @@ class AdaptiveLQG(JointLQG):
             named |= {name: beliefs[:, part], f"{name}_std": uncertainty[:, part]}
         return named
 
-    def _act(
-        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
-    ) -> NDArray[np.float32]:
-        action = super()._act(observation, state, correction)
-        return compensated(action, self._identifier.beliefs(state[:, self._own :]))
+    def decide(
+        self, known: Percept, correction: Array | None = None
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Act as `JointLQG` does, and make up for the gains that thrusters are believed to have."""
+        action, state = super().decide(known, correction)
+        return compensated(action, self._identifier.beliefs(state[:, self._own :])), state
 
 
 def compensated(action: NDArray[np.float32], beliefs: Array) -> NDArray[np.float32]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS, Predictor
 from usm_baselines.laws.adaptive_lqg import compensated
 from usm_baselines.laws.joint_lqg import JointLQG
+from usm_baselines.policy import Percept
 from usm_baselines.privileged import PrivilegedPolicy
 from usm_baselines.signals import Array
 from usm_gym.simulation import Snapshot
@@ -65,7 +66,9 @@ class InformedLQG(PrivilegedPolicy, JointLQG):
             self._scenarios = snapshot.scenarios
             self._told.tell(snapshot.scenarios)
 
-    def _act(
-        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
-    ) -> NDArray[np.float32]:
-        return compensated(super()._act(observation, state, correction), self._told.truth)
+    def decide(
+        self, known: Percept, correction: Array | None = None
+    ) -> tuple[NDArray[np.float32], Array]:
+        """Act as `JointLQG` does, and make up for the gains that thrusters have."""
+        action, state = super().decide(known, correction)
+        return compensated(action, self._told.truth), state

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from usm_baselines.estimation import kalman
 from usm_baselines.planning import Foreseen, improve, problem_of
-from usm_baselines.policy import HEADING_GAIN
+from usm_baselines.policy import HEADING_GAIN, Percept
 from usm_baselines.privileged import PrivilegedPolicy
 from usm_baselines.signals import Array
 from usm_baselines.space import Gain
@@ -83,18 +83,19 @@ class Oracle(PrivilegedPolicy):
         """Run ahead from the true state."""
         self._copy = self._copy_of(snapshot)
 
-    def _act(
-        self, observation: NDArray[np.float32], state: Array, correction: Array | None = None
-    ) -> NDArray[np.float32]:
+    def decide(
+        self, known: Percept, correction: Array | None = None
+    ) -> tuple[NDArray[np.float32], Array]:
         """Carry the plan on by a period, see what comes of it, correct it."""
         copy: Any = self._copy
+        state = known.state.copy()
         own = state[:, self._own :]
         plan = own.reshape(len(own), *self.law_shape)
         plan = np.concatenate([plan[:, 1:], plan[:, -1:]], axis=1)
         foreseen = self._foresee(copy, plan)
         improve(plan, copy.limit, foreseen, self._problem)
         own[:] = plan.reshape(own.shape)
-        return _action(plan[:, 0], copy.limit)
+        return _action(plan[:, 0], copy.limit), state
 
     def _foresee(self, copy: Simulation, plan: Array) -> Foreseen:
         """Run ahead with a plan, (batch, periods, thrusters)."""

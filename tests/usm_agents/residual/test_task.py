@@ -48,7 +48,7 @@ def test_a_model_of_the_task_is_scored_with_its_base():
             # The network's last bits depend on how many robots it acts for.
             np.testing.assert_allclose(scores.per_episode[f"max_error_{axis}"], expected, rtol=1e-3)
     with pytest.raises(
-        ValueError, match=r"is \(44,\); allowed: \(94,\); .* usm_agents.ResidualPolicy"
+        ValueError, match=r"is \(52,\); allowed: \(94,\); .* usm_agents.ResidualPolicy"
     ):
         usm_gym.evaluate(model, [scenario])
     with pytest.raises(ValueError, match="allowed: an environment of the residual task"):

@@ -122,11 +122,13 @@ class EstimatorLearner:
         kept, start = None, np.ones(robots, bool)
         first_episode = np.ones(robots, bool)
         for k in range(periods):
-            memory, truth = envs.memory, setup.truth()
+            known, truth = envs.memory.known, setup.truth()
+            assert known is not None  # the task is to correct estimates
+            observation = known.signals.observation
             rate = truth["velocity"] - scale * seen[:, velocity]
             if k > 0:
-                wanted[k - 1, :, :, 2] += labels.missed(memory.observation, rate)
-            inputs[k], wanted[k] = seen, labels.take(memory.base_state, truth["error"], rate)
+                wanted[k - 1, :, :, 2] += labels.missed(observation, rate)
+            inputs[k], wanted[k] = seen, labels.take(known.state, truth["error"], rate)
             action, kept = network.predict(seen, kept, start)
             seen, _, terminated, truncated, _ = envs.step(action)
             start = terminated | truncated
