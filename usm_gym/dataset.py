@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +21,9 @@ from usm_gym.simulation import Simulation
 from usm_gym.support.files import holding, move_folder, remove_folder
 from usm_gym.support.seeding import RECORDING, stream
 from usm_gym.support.validation import UsageError, require
+
+# What a disk must have left after episodes are written, bytes: HDF5 crashes when it is full.
+SPARE = 2**26
 
 
 def reset_seeds(seed: int, episodes: int) -> list[int]:
@@ -60,22 +68,21 @@ def record(
 
 
 @contextmanager
-def new_dataset(name: str, env: TrackingEnv, about: Mapping[str, Any]) -> Iterator[Any]:
-    """Give the storage of a new dataset, which Minari finds when the block has ended.
+def new_dataset(
+    name: str, env: gym.Env[Any, Any], about: Mapping[str, Any]
+) -> Iterator[Callable[[Sequence[Any]], None]]:
+    """Give a function that adds episodes to a new dataset.
 
-    Whatever interrupts the block leaves no dataset.
+    Minari finds the dataset when the block has ended. Whatever interrupts the block leaves none.
 
     Args:
         name: Its id, such as usm/operation/sta-v0.
         env: The environment of its episodes, made by `gym.make`.
         about: What else its metadata say, in JSON's types.
 
-    Returns:
-        A `minari.dataset.minari_storage.MinariStorage`.
-
     Raises:
         ValueError: If the id is none, or there is a dataset of that id.
-        OSError: If it cannot be written.
+        OSError: If it cannot be written, also in the block.
     """
     import minari
     from minari.dataset.minari_storage import MinariStorage
@@ -96,7 +103,7 @@ def new_dataset(name: str, env: TrackingEnv, about: Mapping[str, Any]) -> Iterat
             )
             known = {"dataset_id": name, "minari_version": minari.__version__}
             storage.update_metadata(known | dict(about))
-            yield storage
+            yield partial(_add, storage)
             if namespace is not None and namespace not in list_local_namespaces():
                 create_namespace(namespace)
             target.mkdir(exist_ok=True)
@@ -119,6 +126,19 @@ def _namespace(name: str) -> str | None:
         allowed = "NAME-vN or NAMESPACE/NAME-vN, such as usm/operation/sta-v0"
         raise UsageError(f"dataset is {name!r}; allowed: {allowed}") from error
     return namespace
+
+
+def _add(storage: Any, episodes: Sequence[Any]) -> None:
+    room = shutil.disk_usage(storage.data_path).free
+    if room < SPARE + 2 * sum(map(_size, episodes)):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(storage.data_path))
+    storage.update_episodes(episodes)
+
+
+def _size(episode: Any) -> int:
+    """What the arrays of an episode take, bytes, without the smallest."""
+    arrays = (episode.observations, episode.actions, *episode.infos.values())
+    return sum(array.nbytes for array in arrays)
 
 
 class _Recorder:

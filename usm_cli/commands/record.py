@@ -62,9 +62,8 @@ def run(arguments: argparse.Namespace) -> None:
     episodes, seed = count(arguments, "episodes", 50), count(arguments, "seed", 0, least=0)
     given = arguments.conditions
     conditions = FIELD if given is None else parse_conditions(given)
-    made = gym.make(
-        f"usm_gym:USM-{arguments.mode.capitalize()}-v0", conditions=asdict(conditions)
-    )
+    task = f"usm_gym:USM-{arguments.mode.capitalize()}-v0"
+    made = gym.make(task, conditions=asdict(conditions))
     env = cast(TrackingEnv, made.unwrapped)
     contender = named(arguments.policy)
     contender.make(env.nominal)
@@ -74,17 +73,16 @@ def run(arguments: argparse.Namespace) -> None:
         "provenance": provenance({"seed": seed}),
     }
     drawn = reset_seeds(seed, episodes)
-    lost = 0
-    with new_dataset(arguments.output, env, about) as storage, progress_bar() as bar:
+    steps = lost = 0
+    with new_dataset(arguments.output, made, about) as add, progress_bar() as bar:
         line = bar.add_task("episodes", total=episodes)
         for part in batches(episodes):
             done = recorded(contender, env, drawn[part], lambda some: bar.advance(line, some))
-            storage.update_episodes(done)
+            add(done)
+            steps += sum(map(len, done))
             lost += sum(bool(episode.terminations[-1]) for episode in done)
-        known = storage.metadata
     output_console().print(
-        f"{arguments.output}: {episodes} episodes of {contender.name}, {lost} lost, "
-        f"{known['total_steps']} steps, {known['dataset_size']:.1f} MB",
+        f"{arguments.output}: {episodes} episodes of {contender.name}, {lost} lost, {steps} steps",
         markup=False,
         highlight=False,
     )
