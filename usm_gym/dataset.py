@@ -20,7 +20,7 @@ from usm_gym.policy import as_action, is_privileged, nominal_of
 from usm_gym.simulation import Simulation
 from usm_gym.support.files import holding, move_folder, remove_folder
 from usm_gym.support.seeding import RECORDING, stream
-from usm_gym.support.validation import UsageError, require
+from usm_gym.support.validation import UsageError, brief, require
 
 # What a disk must have left after episodes are written, bytes: HDF5 crashes when it is full.
 SPARE = 2**26
@@ -124,7 +124,7 @@ def _namespace(name: str) -> str | None:
         namespace: str | None = parse_dataset_id(name)[0]
     except (TypeError, ValueError) as error:  # the former without a version
         allowed = "NAME-vN or NAMESPACE/NAME-vN, such as usm/operation/sta-v0"
-        raise UsageError(f"dataset is {name!r}; allowed: {allowed}") from error
+        raise UsageError(f"dataset is {brief(name)}; allowed: {allowed}") from error
     return namespace
 
 
