@@ -37,6 +37,7 @@ BUDGETS = {
     "usm train": "--steps 1024",
     "usm study": "--only reference --seeds 1 --steps 1024 --episodes 2",
     "usm report": "--policies zero",
+    "usm record": "--episodes 2",
 }
 SHORTER_PYTHON = {
     'PPO("MlpPolicy", env).learn(5000)': 'PPO("MlpPolicy", env, n_steps=64).learn(64)',
@@ -85,6 +86,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "README.md").write_bytes((ROOT / "README.md").read_bytes())
     shutil.copytree(ROOT / "results", tmp_path / "results")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     few = {name: scenarios[:2] for name, scenarios in leaderboard.suites().items()}
     monkeypatch.setattr(leaderboard, "suites", lambda: few)
     sampled = Plan.scenario

@@ -15,6 +15,7 @@ from usm_cli.commands import (
     evaluate,
     leaderboard,
     policies,
+    record,
     report,
     reproduce,
     robustness,
@@ -35,6 +36,7 @@ COMMANDS = (
     tune,
     train,
     study,
+    record,
     watch,
     report,
     reproduce,
@@ -55,6 +57,7 @@ A first look:
   usm tune POLICY              search for better gains
   usm train --output DIR       train an agent that adds thrust to a policy
   usm study residual           train agents and see what their ingredients contribute
+  usm record POLICY            write a dataset for offline learning
   usm reproduce                run the paper's Table 1 and figures anew
   usm bench                    measure the speed on this machine
 """

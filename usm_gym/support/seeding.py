@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-SUITE, EVALUATION, TRAINING, TUNING, VALIDATION = range(5)
+SUITE, EVALUATION, TRAINING, TUNING, VALIDATION, RECORDING = range(6)
 
 
 def stream(seed: int, purpose: int, *index: int) -> np.random.Generator:

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from usm_gym import Conditions, Scenario
 from usm_gym.robot import Robot, Thruster
-from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION, stream
+from usm_gym.support.seeding import (
+    EVALUATION,
+    RECORDING,
+    SUITE,
+    TRAINING,
+    TUNING,
+    VALIDATION,
+    stream,
+)
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import MODES, Mode
@@ -288,7 +296,7 @@ def test_same_seed_same_scenario_and_no_two_seeds_alike() -> None:
         return sample("operation", PRESETS["sea"], stream(*key))
 
     assert first(3, EVALUATION, 7) == first(3, EVALUATION, 7)
-    purposes = (SUITE, EVALUATION, TRAINING, TUNING, VALIDATION)
+    purposes = (SUITE, EVALUATION, TRAINING, TUNING, VALIDATION, RECORDING)
     keys = [(seed, purpose, k) for seed in (0, 1) for purpose in purposes for k in range(20)]
     scenarios = [first(*key) for key in keys]
     assert len(set(scenarios)) == len(keys)
