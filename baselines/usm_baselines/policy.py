@@ -41,6 +41,17 @@ class Percept(NamedTuple):
     state: Array
 
 
+def corrected(signals: Signals, correction: Array | None) -> Signals:
+    """Signals with what is to be added to the estimates, (batch, axes, 3), if anything is."""
+    if correction is None:
+        return signals
+    return signals._replace(
+        y=signals.y + correction[:, :, 0],
+        rate=signals.rate + correction[:, :, 1],
+        disturbance=signals.disturbance + correction[:, :, 2],
+    )
+
+
 class ScriptedPolicy:
     """A control law behind `predict`; subclasses give `Gains`, `state` and `control`.
 
@@ -245,14 +256,8 @@ class ScriptedPolicy:
         Returns:
             Commands, (batch, thrusters), and the state for the next call.
         """
-        signals, state = known.signals, known.state.copy()
+        signals, state = corrected(known.signals, correction), known.state.copy()
         size = len(state)
-        if correction is not None:
-            signals = signals._replace(
-                y=signals.y + correction[:, :, 0],
-                rate=signals.rate + correction[:, :, 1],
-                disturbance=signals.disturbance + correction[:, :, 2],
-            )
         own = state[:, self._own :].copy().reshape(size, *self.law_shape)
         force = np.empty_like(signals.y)
         self.control(signals, own, force)

@@ -27,7 +27,14 @@ from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
 from usm_gym.support.provenance import older_plant
-from usm_gym.support.validation import UsageError, explaining, in_one_line, require, validated
+from usm_gym.support.validation import (
+    Count,
+    UsageError,
+    explaining,
+    in_one_line,
+    require,
+    validated,
+)
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 
@@ -63,6 +70,7 @@ class Agent:
         steps: After how many steps, 0 to 1e12.
         training: Settings, versions and the command of the training.
         scores: Scores with their provenance.
+        memory_period: That of the recurrence, if there is one, in control periods.
     """
 
     summary: str
@@ -83,6 +91,7 @@ class Agent:
     steps: Annotated[int, Strict(), Field(ge=0, le=10**12)]
     training: dict[str, Any]
     scores: dict[str, Any]
+    memory_period: Annotated[Count, Field(le=1000)] = 1
 
 
 _ADAPTER = TypeAdapter(Agent)
@@ -98,7 +107,9 @@ def write_agent(folder: Path, description: Mapping[str, Any], network: Network) 
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[f"weight_{k}"], arrays[f"bias_{k}"] = weight, bias
     if network.recurrence is not None:
-        arrays |= {RECURRENCE + name: array for name, array in network.recurrence._asdict().items()}
+        memory = network.recurrence._asdict()
+        description = {**description, "memory_period": memory.pop("period")}
+        arrays |= {RECURRENCE + name: array for name, array in memory.items()}
     data = save(arrays)
     agent = Agent(
         **description,
@@ -167,7 +178,7 @@ def _network(agent: Agent, arrays: dict[str, NDArray[np.float32]]) -> Network:
         tuple(arrays[f"bias_{k}"] for k in layers),
         agent.activation,
         agent.output,
-        Recurrence(**recurrence) if recurrence else None,
+        Recurrence(**recurrence, period=agent.memory_period) if recurrence else None,
     )
 
 

@@ -24,15 +24,20 @@ CODES = {"tanh": TANH, "relu": RELU, "clip": CLIP}
 class Recurrence(NamedTuple):
     """A layer of long short-term memory; its four gates are in torch's order: i, f, g, o.
 
+    Where the first layer above it is wide enough, that sees the observation, too.
+
     Attributes:
         given: Weights of what is given, (inputs, 4 units), float32.
         kept: Weights of its own last answer, (units, 4 units), float32.
         bias: (4 units,), float32.
+        period: It takes in an observation at the first call of an episode and then at every call
+            after so many; in between its answer stays.
     """
 
     given: Array
     kept: Array
     bias: Array
+    period: int = 1
 
     @property
     def units(self) -> int:
@@ -63,12 +68,15 @@ class Network:
         require(len(self.weights) == len(self.biases) > 0, "layers", len(self.weights), "1 or more")
         width = self.inputs
         if self.recurrence is not None:
-            given, kept, bias = self.recurrence
+            given, kept, bias, period = self.recurrence
+            require(period >= 1, "period of the recurrence", period, "1 or more")
             gates = 4 * len(kept)
             require(bias.shape == (gates,), "gates of the recurrence", bias.shape, f"({gates},)")
             check_layer(given, bias, width)
             width = self.recurrence.units
             check_layer(kept, bias, width)
+            if self.weights[0].ndim == 2 and len(self.weights[0]) != width:
+                width += self.inputs
         for weight, bias in zip(self.weights, self.biases, strict=True):
             check_layer(weight, bias, width)
             width = weight.shape[1]
@@ -101,16 +109,19 @@ class Network:
 
         Returns:
             Actions, (batch, outputs), and the state: nothing, or what a recurrence has answered and
-            keeps, (batch, 2, units).
+            keeps, and how many calls ago it took in anything, (batch, 2 units + 1).
         """
         values = np.asarray(observation, np.float32)
         if self.recurrence is not None:
+            units = self.recurrence.units
             if state is None:
-                state = np.zeros((len(values), 2, self.recurrence.units), np.float32)
+                state = np.zeros((len(values), 2 * units + 1), np.float32)
             start = np.zeros(len(values), bool) if episode_start is None else episode_start
-            state = np.where(np.asarray(start)[:, None, None], np.float32(0.0), state)
+            state = np.where(np.asarray(start)[:, None], np.float32(0.0), state)
             recur(*self.recurrence, values, state)
-            values = np.ascontiguousarray(state[:, 0])
+            beside = len(self.weights[0]) > units
+            parts = [state[:, :units], values] if beside else [state[:, :units]]
+            values = np.concatenate(parts, axis=1)
         last = len(self.weights) - 1
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             out = np.empty((len(values), bias.size), np.float32)
@@ -170,12 +181,16 @@ def layer(weight, bias, values, function, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def recur(given, kept, bias, values, state):  # type: ignore[no-untyped-def]
-    """Advance a recurrence by the observations of a batch; `state` is (batch, 2, units)."""
+def recur(given, kept, bias, period, values, state):  # type: ignore[no-untyped-def]
+    """Advance a recurrence by the observations of a batch; `state` is (batch, 2 units + 1)."""
     units = kept.shape[0]
     gates = np.empty(4 * units, np.float32)
     for b in range(len(values)):
-        answer, memory = state[b]
+        calls = state[b, 2 * units]
+        state[b, 2 * units] = (calls + 1) % period
+        if calls > 0:
+            continue
+        answer, memory = state[b, :units], state[b, units : 2 * units]
         gates[:] = bias
         add_product(given, values[b], gates)
         add_product(kept, answer, gates)

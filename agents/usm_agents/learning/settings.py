@@ -44,13 +44,15 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "td3": _REPLAY | {"noise": 0.2} | _FEW,  # standard deviation, independent in each step
     "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "estimator": {
-        "robots": 64,
-        "kept": 5,  # rounds that are fitted
-        "epochs": 3,
+        "robots": 128,
+        "kept": 8,  # rounds that are fitted
+        "epochs": 8,
         "batch": 32,  # robots
-        "window": 50,  # periods through which gradients go
+        "memory_period": 5,  # control periods from one observation that the memory takes in on
+        "window": 100,  # of these observations, through which gradients go
         "learning_rate": 2e-3,  # at the start; falls linearly to a tenth over the training
-        "units": 64,  # LSTM units
+        "weight_decay": 0.1,
+        "units": 96,  # LSTM units
         "hidden": 64,
     },
 }

@@ -228,7 +228,8 @@ def _made_for(nominal: Nominal, current: Residual, arguments: Mapping[str, Any])
 def _chosen(which: Flags, new: Any, old: Any) -> Any:
     if isinstance(new, tuple):
         pairs = zip(new, old, strict=True)
-        return type(new)(*(_chosen(which, now, before) for now, before in pairs))
+        chosen = [_chosen(which, now, before) for now, before in pairs]
+        return type(new)(*chosen) if hasattr(new, "_fields") else tuple(chosen)
     if old is None or isinstance(new, bool):  # a policy without state; what is the same for all
         return new
     return np.where(which.reshape(-1, *[1] * (new.ndim - 1)), new, old)

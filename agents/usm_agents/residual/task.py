@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 from usm_baselines.contender import contender
-from usm_baselines.estimation.estimator import Estimator
-from usm_baselines.estimation.prediction import NAMES
-from usm_baselines.policy import Percept, ScriptedPolicy
+from usm_baselines.estimation.estimator import Estimate, Estimator, foreseen
+from usm_baselines.estimation.prediction import NAMES, believed
+from usm_baselines.policy import Percept, ScriptedPolicy, corrected
 
 from usm_agents.residual.observation import DEVIATIONS, SHORT
 from usm_agents.residual.observer import ResidualObserver
@@ -142,6 +142,10 @@ class Residual:
             require(estimating, "base", base, "a law that estimates by the plant, to be corrected")
             assert isinstance(base, ScriptedPolicy)
             self._corrected = base
+        # A base whose estimates another agent corrects: this one is shown what that base believes.
+        self._believing: Residual | None = None
+        if isinstance(base, ResidualPolicy) and base.residual.corrects:
+            self._believing = base.residual
         axes = len(world_of(nominal.robot).axes)
         numbers = {"wrench": 3, "thrusters": plain.thrusters, "estimates": 3 * axes}
         self.actions = numbers[action]
@@ -153,6 +157,11 @@ class Residual:
         self.layout = self._observer.layout
         deviation = max(nominal.position_noise, LEAST_DEVIATION)
         self.correction = deviation * np.array(LARGEST_CORRECTION)
+
+    @property
+    def corrects(self) -> bool:
+        """Whether the agent corrects the estimates that the base acts on."""
+        return self._corrected is not None
 
     @property
     def action_space(self) -> gym.Space[Array]:
@@ -188,10 +197,13 @@ class Residual:
         else:
             base_action, base_state = self.base.predict(observation, base_state, start, True)
             base_action = np.ascontiguousarray(base_action, np.float32)
-        estimate = self._estimator.update(observation, filtered, start)
+        if self._believing is not None:
+            estimate, filtered = self._believing.estimate(base_state[0]), np.empty((size, 0))
+        else:
+            estimate, filtered = self._estimator.update(observation, filtered, start)
         seen, frames = self._observer.update(estimate, base_action, base_state, action, past, start)
         limit = observation[:, self._limit] * self._limit_scale
-        allocation, filtered = estimate.signals.allocation, estimate.state
+        allocation = estimate.signals.allocation
         return seen, Memory(
             limit, allocation, base_action, base_state, filtered, frames, action, known
         )
@@ -208,9 +220,8 @@ class Residual:
         """
         action = action.clip(-1.0, 1.0)
         if self._corrected is not None:
-            correction = self.correction * action.reshape(len(action), -1, len(NAMES))
             assert memory.known is not None
-            command, base_state = self._corrected.decide(memory.known, correction)
+            command, base_state = self._corrected.decide(memory.known, self._correction(action))
             return command, memory._replace(action=action, base_state=base_state)
         command = np.empty_like(memory.base_action)
         correct_all(
@@ -223,11 +234,28 @@ class Residual:
         )
         return command, memory._replace(action=action)
 
+    def estimate(self, memory: Memory) -> Estimate:
+        """What the base acted on, its estimates corrected, and what its plant foresees by that.
+
+        Args:
+            memory: What `command` returned, the action being "estimates".
+        """
+        law, known = self._corrected, memory.known
+        assert law is not None and law.predictor is not None
+        assert known is not None
+        signals = corrected(known.signals, self._correction(memory.action))
+        state = believed(signals, known.state[:, law.predictor_columns])
+        return foreseen(law.predictor, signals, state)
+
+    def _correction(self, action: Array) -> NDArray[np.float64]:
+        return self.correction * action.reshape(len(action), -1, len(NAMES))
+
 
 class ResidualPolicy:
     """Base policy and agent as one policy of the plain environment.
 
     Attributes:
+        residual: The residual task.
         nominal: What the policy knows of the robot.
         base: The base policy.
         privileged: Never, here.
@@ -249,8 +277,8 @@ class ResidualPolicy:
         Raises:
             ValueError: If `residual` is neither.
         """
-        self._residual, self._agent = _task(residual), agent
-        self.nominal, self.base = self._residual.nominal, self._residual.base
+        self.residual, self._agent = _task(residual), agent
+        self.nominal, self.base = self.residual.nominal, self.residual.base
 
     def predict(
         self,
@@ -266,9 +294,9 @@ class ResidualPolicy:
         start = np.full(len(batch), memory is None)
         if episode_start is not None:
             start |= np.asarray(episode_start, bool)
-        seen, memory = self._residual.observe(batch, memory, start)
+        seen, memory = self.residual.observe(batch, memory, start)
         action, agent_state = self._agent.predict(seen, agent_state, start, deterministic)
-        command, memory = self._residual.command(memory, np.asarray(action, np.float32))
+        command, memory = self.residual.command(memory, np.asarray(action, np.float32))
         return (command if plain.ndim == 2 else command[0]), (memory, agent_state)
 
 

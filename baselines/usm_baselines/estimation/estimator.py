@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from usm_baselines.estimation.navigator import ACCELERATION_NOISE, DISTURBANCE_NOISE
 from usm_baselines.estimation.plant_navigator import PlantNavigator
+from usm_baselines.estimation.prediction import Predictor
 from usm_baselines.signals import Array, Signals, model_of, sense, shared_size, signals_of
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
@@ -22,15 +23,24 @@ class Estimate(NamedTuple):
     """What is known of a batch of robots.
 
     Attributes:
-        signals: What was measured and applied, and what the navigator makes of it.
+        signals: What was measured and applied, and what is estimated from it.
         ahead: (error, rate) in m and m/s after each of `LEADS` if the last commands are held,
             (leads, batch, axes, 2).
-        state: The state for the next call.
     """
 
     signals: Signals
     ahead: Array
-    state: Array
+
+
+def foreseen(predictor: Predictor, signals: Signals, state: Array) -> Estimate:
+    """What is known by the estimates that are among the signals.
+
+    Args:
+        predictor: What looks ahead.
+        signals: What was measured, applied and estimated.
+        state: State of the predictor, (batch, size).
+    """
+    return Estimate(signals, predictor.foresee(signals, state, LEADS[-1])[_ROWS])
 
 
 class Estimator:
@@ -54,13 +64,16 @@ class Estimator:
 
     def update(
         self, observation: NDArray[np.float32], state: Array | None, start: NDArray[np.bool_]
-    ) -> Estimate:
+    ) -> tuple[Estimate, Array]:
         """Take in a batch of observations.
 
         Args:
             observation: Plain observations, (batch, numbers).
             state: What the last call returned; None at the start.
             start: Where an episode starts, (batch,).
+
+        Returns:
+            What is known, and the state for the next call.
         """
         model, size, shared = self._model, len(observation), self._shared
         if state is None:
@@ -72,9 +85,8 @@ class Estimator:
         sense(new, model, signals)
         memory = new[:, shared:].copy()
         self._navigator.estimate(signals, model.mass, memory)
-        ahead = self._navigator.predictor.foresee(signals, memory, LEADS[-1])
         new[:, 0] = 1.0
         known = signals.allocation[:, : model.axes].reshape(size, -1)
         new[:, 1 : 1 + known.shape[1]] = known
         new[:, shared:] = memory
-        return Estimate(signals, ahead[_ROWS], new)
+        return foreseen(self._navigator.predictor, signals, memory), new

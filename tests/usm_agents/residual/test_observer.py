@@ -27,7 +27,7 @@ def summed(values):
 def expected(residual, memory, observation, estimator_state, start, last):
     """All entries by name, physical."""
     layout = ObservationLayout(residual.nominal.robot.links, len(residual.nominal.robot.thrusters))
-    signals, ahead, _ = Estimator(residual.nominal).update(observation, estimator_state, start)
+    (signals, ahead), _ = Estimator(residual.nominal).update(observation, estimator_state, start)
     value = {name: (observation * layout.scale)[:, part] for name, part in layout.slices.items()}
     behind = np.arange(layout.links - 1, 0, -1) / layout.links
     parts = signals.allocation * (memory.base_action * value["thruster_limit"])[:, None]

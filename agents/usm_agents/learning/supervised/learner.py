@@ -50,28 +50,40 @@ class Round(NamedTuple):
 
 
 class Corrector(nn.Module):
-    """A layer with memory, a hidden one, and corrections, which are 0 at first."""
+    """A layer with memory, beside it what is seen now, a hidden layer, and corrections.
+
+    The corrections are 0 at first. The memory takes in one observation in several, since what it is
+    to keep does not change fast: so it is fitted faster, over more time, and learns less by heart.
+    """
 
     def __init__(self, inputs: int, outputs: int, units: int, hidden: int) -> None:
         """Make the layers."""
         super().__init__()
         self.memory = nn.LSTM(inputs, units)
-        self.hidden, self.last = nn.Linear(units, hidden), nn.Linear(hidden, outputs)
+        self.hidden, self.last = nn.Linear(units + inputs, hidden), nn.Linear(hidden, outputs)
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
 
-    def forward(self, seen: torch.Tensor, kept: tuple[torch.Tensor, ...] | None):  # type: ignore[no-untyped-def]
-        """Corrections over some periods, (periods, robots, outputs), and what is kept."""
-        answers, kept = self.memory(seen, kept)
-        return self.last(torch.tanh(self.hidden(answers))), kept
+    def forward(  # type: ignore[no-untyped-def]
+        self, taken: torch.Tensor, seen: torch.Tensor, kept: tuple[torch.Tensor, ...] | None
+    ):
+        """Corrections, (instants, robots, outputs), and what is kept.
+
+        Args:
+            taken: What the memory takes in, (instants, robots, inputs).
+            seen: What is seen a while later, the same number of instants.
+            kept: What the last call returned; None at the start.
+        """
+        answers, kept = self.memory(taken, kept)
+        return self.last(torch.tanh(self.hidden(torch.cat([answers, seen], dim=2)))), kept
 
 
 class EstimatorLearner:
     """Learns to correct the estimates that a law acts on; a `Learner` for the action "estimates".
 
-    Settings: robots; rounds whose data are kept; epochs of a fit; robots of a batch; periods
-    through which gradients go; learning rate; units of the recurrent layer, width of the hidden
-    one.
+    Settings: robots; rounds whose data are kept; epochs of a fit; robots of a batch; control
+    periods from one observation that the memory takes in to the next, and through how many of these
+    gradients go; learning rate; weight decay; units of the memory, width of the hidden layer.
     """
 
     def __init__(self, setup: TrainingSetup) -> None:
@@ -88,7 +100,11 @@ class EstimatorLearner:
             settings["units"],
             settings["hidden"],
         )
-        self._optimizer = torch.optim.Adam(self._model.parameters(), settings["learning_rate"])
+        self._optimizer = torch.optim.AdamW(
+            self._model.parameters(),
+            settings["learning_rate"],
+            weight_decay=settings["weight_decay"],
+        )
         self._random = stream(setup.seed, TRAINING)
         self._rounds: list[Round] = []
         # Standard deviations of what is wanted at first, by output.
@@ -151,17 +167,22 @@ class EstimatorLearner:
             torch.from_numpy(np.concatenate(parts, axis=1))
             for parts in zip(*self._rounds, strict=True)
         )
-        losses = []
+        period = settings["memory_period"]
+        span = settings["window"] * period
+        instants, losses = len(seen) // period, []
         for _ in range(settings["epochs"]):
             order = torch.from_numpy(self._random.permutation(seen.shape[1]))
             for robots in order.split(settings["batch"]):
+                its = [part[: instants * period, robots] for part in (seen, wanted, valid)]
                 kept = None
-                for first_period in range(0, len(seen), settings["window"]):
-                    now = slice(first_period, first_period + settings["window"])
-                    answer, kept = self._model(seen[now, robots], kept)
+                for begin in range(0, instants * period, span):
+                    taken = slice(begin, begin + span, period)
+                    # What is wanted at one of the periods until the memory is next refreshed.
+                    now = slice(begin + int(self._random.integers(period)), begin + span, period)
+                    answer, kept = self._model(its[0][taken], its[0][now], kept)
                     kept = tuple(each.detach() for each in kept)
-                    counted = valid[now, robots, None].expand_as(answer)
-                    off, none = (answer - wanted[now, robots]) / unit, torch.zeros_like(answer)
+                    counted = its[2][now, :, None].expand_as(answer)
+                    off, none = (answer - its[1][now]) / unit, torch.zeros_like(answer)
                     costs = counted * huber_loss(off, none, reduction="none", delta=LINEAR)
                     loss = costs.sum() / (counted.sum() + 1.0)
                     self._optimizer.zero_grad()
@@ -181,7 +202,12 @@ class EstimatorLearner:
             tuple(layer.bias.detach().numpy().copy() for layer in layers),
             "tanh",
             "clip",
-            Recurrence(given.T.copy(), kept.T.copy(), one + other),
+            Recurrence(
+                given.T.copy(),
+                kept.T.copy(),
+                one + other,
+                self._setup.settings["memory_period"],
+            ),
         )
 
     def log(self, numbers: Mapping[str, float]) -> None:
