@@ -241,7 +241,8 @@ class Residual:
             memory: What `command` returned, the action being "estimates".
         """
         law, known = self._corrected, memory.known
-        assert law is not None and law.predictor is not None
+        assert law is not None
+        assert law.predictor is not None
         assert known is not None
         signals = corrected(known.signals, self._correction(memory.action))
         state = believed(signals, known.state[:, law.predictor_columns])
