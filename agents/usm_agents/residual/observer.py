@@ -25,7 +25,9 @@ Flags = NDArray[np.bool_]
 # The entries that do not depend on the base, by name: their numbers in the order of the table.
 _NAMES = [entry.name for entry in ResidualLayout(thrusters=1, actions=1, base=()).complete]
 ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
-WRENCH = ("base_force", "base_moment")
+# What is not shown to an agent that corrects estimates: the base has not acted yet, and what the
+# agent has corrected before is in the command.
+NOT_TO_CORRECT = ("base_force", "base_moment", "last_action")
 FORESEEN = _NAMES.index(f"foreseen_error_{LEADS[0]}")  # the others follow
 
 
@@ -194,8 +196,8 @@ class ResidualObserver:
             replace(entry, scale=length, bound=10 * length) if entry.unit == "m" else entry
             for entry in base_entries(columns)
         )
-        if corrects:  # the base has not acted yet
-            omit = (*omit, *(name for name in WRENCH if name not in omit))
+        if corrects:
+            omit = (*omit, *(name for name in NOT_TO_CORRECT if name not in omit))
         self.layout = ResidualLayout(plain.thrusters, actions, entries, length, omit, frames)
         whole = ResidualLayout(plain.thrusters, actions, entries, length)
         numbers, slices = np.arange(whole.size), whole.slices

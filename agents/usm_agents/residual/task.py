@@ -27,7 +27,7 @@ from usm_gym.world import world_of
 Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
-ActionKind = Literal["wrench", "thrusters", "estimates"]
+ActionKind = Literal["force", "wrench", "thrusters", "estimates"]
 # The limit of a thruster: less slows learning down, more buys error with chattering.
 RESIDUAL_SCALE = 20.0
 # The largest corrections of error, rate and disturbance over the standard deviation of a measured
@@ -147,7 +147,12 @@ class Residual:
         if isinstance(base, ResidualPolicy) and base.residual.corrects:
             self._believing = base.residual
         axes = len(world_of(nominal.robot).axes)
-        numbers = {"wrench": 3, "thrusters": plain.thrusters, "estimates": 3 * axes}
+        numbers = {
+            "force": axes,
+            "wrench": 3,
+            "thrusters": plain.thrusters,
+            "estimates": len(NAMES) * axes,
+        }
         self.actions = numbers[action]
         self._estimator = Estimator(nominal)
         length = max(SHORT, DEVIATIONS * nominal.position_noise)
@@ -224,13 +229,12 @@ class Residual:
             command, base_state = self._corrected.decide(memory.known, self._correction(action))
             return command, memory._replace(action=action, base_state=base_state)
         command = np.empty_like(memory.base_action)
+        residual = self._scale * action.astype(np.float64)
+        if self._action == "force":  # a wrench without moment
+            residual = np.pad(residual, ((0, 0), (0, 3 - self.actions)))
+        as_wrench = self._action != "thrusters"
         correct_all(
-            memory.base_action,
-            memory.allocation,
-            memory.limit,
-            self._scale * action.astype(np.float64),
-            self._action == "wrench",
-            command,
+            memory.base_action, memory.allocation, memory.limit, residual, as_wrench, command
         )
         return command, memory._replace(action=action)
 

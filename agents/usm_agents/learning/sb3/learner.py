@@ -17,7 +17,7 @@ from stable_baselines3.common.utils import set_random_seed
 from usm_agents.artifact.network import Network
 from usm_agents.learning.divergence import check_weights
 from usm_agents.learning.learner import TrainingSetup
-from usm_agents.learning.sb3.models import CLASSES, make_model, network_of
+from usm_agents.learning.sb3.models import CLASSES, REWARD, make_model, network_of
 from usm_agents.learning.sb3.vec_env import SB3VecEnv
 
 MODEL, REPLAY, STATES = "model.zip", "replay.pickle", "states.pickle"
@@ -32,7 +32,8 @@ class SB3Learner:
         torch.set_num_threads(1)
         set_random_seed(setup.seed)
         self._setup = setup
-        self._vec_env = SB3VecEnv(setup.envs, setup.settings["reward_scale"])
+        prices = {name: setup.settings[name] for name in REWARD}
+        self._vec_env = SB3VecEnv(setup.envs, **prices)
         self._vec_env.action_space.seed(setup.seed)
         self._model = make_model(setup.algorithm, setup.settings, self._vec_env)
         self._started = False

@@ -25,6 +25,8 @@ CLASSES: dict[str, type[BaseAlgorithm]] = {
     "td3": TD3,
     "tqc": TQC,
 }
+# Settings that say what the reward is, and not how it is learned from.
+REWARD = ("reward_scale", "variation_price")
 ON_POLICY = ("ppo", "recurrent-ppo")
 
 
@@ -48,7 +50,8 @@ def make_model(algorithm: str, settings: Mapping[str, Any], env: VecEnv) -> Base
         env: Robots on the residual task.
     """
     arguments: dict[str, Any] = dict(settings)
-    del arguments["robots"], arguments["reward_scale"]
+    for name in ("robots", *REWARD):
+        del arguments[name]
     policy: dict[str, Any] = {"net_arch": list(arguments.pop("hidden"))}
     kind = "MlpPolicy"
     if algorithm == "recurrent-ppo":

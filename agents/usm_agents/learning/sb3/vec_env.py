@@ -29,13 +29,18 @@ class SB3VecEnv(VecEnv):
     """
 
     def __init__(
-        self, envs: gym.vector.VectorEnv[Any, Any, Any], reward_scale: float = 1.0
+        self,
+        envs: gym.vector.VectorEnv[Any, Any, Any],
+        reward_scale: float = 1.0,
+        variation_price: float = 0.0,
     ) -> None:
         """Take a vector environment made with `autoreset_mode="SameStep"`.
 
         Args:
             envs: The environment.
             reward_scale: Factor on the rewards of steps; the returns in infos are left as they are.
+            variation_price: What is taken from the reward of a step for each N/s by which the
+                commands change in it, as the score has it (`usm_gym.task.metrics`).
 
         Raises:
             ValueError: If it is of another package, or does not restart episodes within a step.
@@ -55,7 +60,8 @@ class SB3VecEnv(VecEnv):
             f"{AutoresetMode.SAME_STEP.value!r}",
         )
         self._envs: Any = envs
-        self._reward_scale = reward_scale
+        self._plain = plain
+        self._reward_scale, self._variation_price = reward_scale, variation_price
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
         self._began = time.time()
         self._returns = np.zeros(self.num_envs)
@@ -71,6 +77,7 @@ class SB3VecEnv(VecEnv):
         self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
+        self._command = self._commanded()
         return np.asarray(observations)
 
     def step_async(self, actions: np.ndarray[Any, Any]) -> None:
@@ -99,15 +106,31 @@ class SB3VecEnv(VecEnv):
             }
         self._returns[done] = 0.0
         self._lengths[done] = 0
-        return observations, (self._reward_scale * rewards).astype(np.float32), done, robot_infos
+        price = self._variation_price * self._variation(done)
+        rewards = self._reward_scale * (rewards - price)
+        return observations, rewards.astype(np.float32), done, robot_infos
+
+    def _variation(self, done: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """How fast the commands of each robot change, N/s; 0 in the step that ends an episode."""
+        before, self._command = self._command, self._commanded()
+        period = self._plain.nominal.control_period
+        change = np.abs(self._command - before).mean(axis=1) / period
+        return np.where(done, 0.0, change)
+
+    def _commanded(self) -> np.ndarray[Any, Any]:
+        """The commands in effect, N, (robots, thrusters)."""
+        simulation = self._plain.simulation
+        place = simulation.layout.slices["thruster_command"]
+        over_limit = simulation.observation[:, place] * simulation.layout.scale[place]
+        return np.asarray(over_limit * simulation.limit[:, np.newaxis])
 
     def snapshot(self) -> tuple[Any, ...]:
         """Copy the whole state."""
-        return self._envs.snapshot(), self._returns.copy(), self._lengths.copy()
+        return self._envs.snapshot(), self._returns.copy(), self._lengths.copy(), self._command
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Return to a snapshot."""
-        envs, returns, lengths = snapshot
+        envs, returns, lengths, self._command = snapshot
         self._envs.restore(envs)
         self._returns[:], self._lengths[:] = returns, lengths
 
