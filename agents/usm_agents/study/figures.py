@@ -86,7 +86,7 @@ def _front(home: HomeResult) -> Any:
                     marker="o" if name in home.agents else "s",
                     markerfacecolor=style["color"] if name in home.agents else "none",
                     linestyle="none",
-                    label=name,
+                    label=home.rows[name].label(name),
                 )
         panel.set(xscale="log", yscale="log")
         panel.set(xlabel="thrust variation [N/s]", ylabel=f"error in {axis} [mm]")
@@ -106,7 +106,9 @@ def _profiles(home: HomeResult) -> Any:
         thresholds = np.geomspace(max(every.min(), 1e-3), every.max(), THRESHOLDS)
         for name, style in _styles(home).items():
             shares, (low, high) = performance_profile(tables[name], thresholds)
-            panel.plot(thresholds, shares, label=name, linewidth=1.4, **style)
+            panel.plot(
+                thresholds, shares, label=home.rows[name].label(name), linewidth=1.4, **style
+            )
             panel.fill_between(
                 thresholds, low, high, color=style["color"], alpha=SHADE, linewidth=0
             )
@@ -123,11 +125,14 @@ def _shifts(home: HomeResult) -> Any:
     figure, (panels,) = _grid(home)
     for panel, axis in zip(panels, home.axes, strict=True):
         for number, (name, style) in enumerate(_styles(home).items()):
-            errors = [home.competing[name].home.by_shift[shift][axis] for shift in shifts]
+            row = home.competing[name]
+            errors = [row.home.by_shift[shift][axis] for shift in shifts]
             bars = [_bars(error.mean, error.ci95, 1e3) for error in errors]
             places = np.arange(len(shifts)) + 0.02 * (number - len(home.competing) / 2)
             means = [1e3 * error.mean for error in errors]
-            panel.errorbar(places, means, np.hstack(bars), label=name, capsize=2, **style)
+            panel.errorbar(
+                places, means, np.hstack(bars), label=row.label(name), capsize=2, **style
+            )
         panel.set_xticks(range(len(shifts)), shifts)
         panel.set(yscale="log", xlabel="shift", ylabel=f"error in {axis} [mm]")
         panel.grid(alpha=0.3, which="both")

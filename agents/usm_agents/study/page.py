@@ -28,15 +28,16 @@ that is given true state is no competitor, and only shows what could be reached.
 AGAINST = """\
 An agent over a rival in the same scenarios, with 95 % intervals as above: ratios of the means of
 the largest position errors, of thrust variation, and of the errors of the attitude, where less than
-1 is better; where an interval holds 1, the data do not decide. "Better" is the probability that the
-agent has the smaller error in an episode; "seeds" says how many of them have smaller means in
+1 is better; where an interval holds 1, the data do not decide. "Better in" is the probability that
+the agent has the smaller error in an episode; "better seeds" says how many have smaller means in
 {all} axes. A smaller error at a larger thrust variation or attitude error is no victory: the fair
 rival is the one that spends as much.
 """
 SHIFTS = """\
 Largest error from a shift of the joint references to the next, mm, mean {axes}: an episode here is
 a scan of many shifts, during which a policy may learn. "Fifth over first" is the ratio of these
-means with its interval; it is about 1 for a policy that does not adapt.
+means with its interval. Shifts need not be equally hard: it is to be held against that of policies
+that do not adapt.
 """
 ELSEWHERE = """\
 Mean errors {axes}, mm, over {half} scenarios under other conditions than those of the training;

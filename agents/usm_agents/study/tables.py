@@ -17,7 +17,7 @@ from usm_agents.study.results import (
     Trained,
 )
 from usm_gym.support.text import degrees, figures, mm
-from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of
+from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
 
 NOTHING = ""
 
@@ -141,15 +141,16 @@ def taken(dissected: Mapping[str, Dissection]) -> str:
 def _ratios(claims: Mapping[str, Claim]) -> dict[str, str]:
     """The metrics of which claims have ratios, with the heads of their columns."""
     known = dict.fromkeys(metric for claim in claims.values() for metric in claim.ratios)
-    angles = {angle + ANGLE_ERROR: angle for angle in attitude_of(known)}
-    words = {"thrust_variation": "variation", **angles}
-    return {metric: words.get(metric, metric.removeprefix(MAX_ERROR)) for metric in known}
+    words = {MAX_ERROR + axis: f"error {axis}" for axis in axes_of(known)}
+    words |= {angle + ANGLE_ERROR: angle for angle in attitude_of(known)}
+    words["thrust_variation"] = "variation"
+    return {metric: words[metric] for metric in known}
 
 
 def _claimed(claims: Mapping[str, Claim]) -> list[str]:
     """The heads of the columns of claims."""
     axes = next(iter(claims.values())).improvements
-    return [*_ratios(claims).values(), *(f"better in {axis}" for axis in axes), "seeds"]
+    return [*_ratios(claims).values(), *(f"better in {axis}" for axis in axes), "better seeds"]
 
 
 def _claim(claim: Claim, claims: Mapping[str, Claim]) -> list[str]:
