@@ -55,6 +55,7 @@ def _curves(home: HomeResult) -> Any:
                 low, high = errors.min(axis=0), errors.max(axis=0)
                 panel.fill_between(steps, low, high, color=colour, alpha=SHADE, linewidth=0)
             panel.set(yscale="log", xlabel="million steps", ylabel=f"error in {axis} [mm]")
+            _read_log(panel.yaxis)
             panel.grid(alpha=0.3)
         panels[0].set_title(f"{title}: mean over seeds, and from the best seed to the worst")
         panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0))
@@ -90,7 +91,9 @@ def _front(home: HomeResult) -> Any:
                 )
         panel.set(xscale="log", yscale="log")
         panel.set(xlabel="thrust variation [N/s]", ylabel=f"error in {axis} [mm]")
-        panel.grid(alpha=0.3, which="both")
+        _read_log(panel.xaxis)
+        _read_log(panel.yaxis)
+        panel.grid(alpha=0.3)
     _name(figure, panels[0])
     return figure
 
@@ -113,6 +116,7 @@ def _profiles(home: HomeResult) -> Any:
                 thresholds, low, high, color=style["color"], alpha=SHADE, linewidth=0
             )
         panel.set(xscale="log", xlabel=f"error in {axis} [mm]")
+        _read_log(panel.xaxis)
         panel.grid(alpha=0.3)
     panels[0].set_ylabel("share of episodes with at most this error")
     _name(figure, panels[0])
@@ -135,7 +139,8 @@ def _shifts(home: HomeResult) -> Any:
             )
         panel.set_xticks(range(len(shifts)), shifts)
         panel.set(yscale="log", xlabel="shift", ylabel=f"error in {axis} [mm]")
-        panel.grid(alpha=0.3, which="both")
+        _read_log(panel.yaxis)
+        panel.grid(alpha=0.3)
     _name(figure, panels[0])
     return figure
 
@@ -176,6 +181,17 @@ def _styles(home: HomeResult) -> dict[str, dict[str, str]]:
         name: {"color": f"C{number % 10}", "linestyle": ":" if number >= 10 else lines[name]}
         for number, name in enumerate(rows)
     }
+
+
+def _read_log(axis: Any) -> None:
+    """Write plain numbers on a logarithmic axis, a few however little it covers."""
+    from matplotlib import ticker
+
+    low, high = axis.get_view_interval()
+    narrow = high < 6.0 * low
+    axis.set_major_locator(ticker.MaxNLocator(5) if narrow else ticker.LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(ticker.NullFormatter())
 
 
 def _bars(mean: float, interval: tuple[float, float], scale: float = 1.0) -> Any:
