@@ -35,7 +35,7 @@ BUDGETS = {
     "usm watch": "--speed 40",
     "usm train --resume": "",
     "usm train": "--steps 1024",
-    "usm study": "--only reference --seeds 1 --steps 1024 --episodes 2",
+    "usm study": "--only scale-6 --seeds 1 --steps 1024 --episodes 2",
     "usm report": "--policies zero",
     "usm record": "--episodes 2",
 }

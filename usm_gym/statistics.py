@@ -56,27 +56,52 @@ def mean_interval(values: Array) -> tuple[float, Interval]:
     return float(np.mean(values)), interval(np.mean, values)
 
 
-def ratio_interval(first: ArrayLike, second: ArrayLike) -> Interval:
-    """Interval of the mean of a first policy over that of a second, on the same episodes.
+def ratio_interval(first: ArrayLike, second: ArrayLike, *, same_seeds: bool = False) -> Interval:
+    """Interval of the mean of first scores over that of second ones, on the same episodes.
 
     Both meet the same draw of episodes; the seeds of each are drawn for themselves.
 
     Args:
         first: Scores of the first policy, (episodes,) or (seeds, episodes).
         second: The same of the second policy, with its own number of seeds.
+        same_seeds: Whether both are scores of the same trainings, whose seeds are drawn once.
 
     Raises:
-        ValueError: If the numbers of episodes differ.
+        ValueError: If the numbers of episodes differ, or those of the same seeds.
     """
-    one, other = (np.atleast_2d(np.asarray(scores, np.float64)) for scores in (first, second))
-    count = one.shape[1]
-    require(other.shape[1] == count, "episodes of the second", other.shape[1], f"{count}")
+    one, other = _tables(first, second)
 
     def ratio(ours: Any, theirs: Any, episodes: Any) -> Any:
         mean = _crossed(one, ours, episodes).mean(axis=-1)
         return mean / _crossed(other, theirs, episodes).mean(axis=-1)
 
-    return _interval(ratio, len(one), len(other), count)
+    if same_seeds:
+        require(len(one) == len(other), "seeds of the second", len(other), f"{len(one)}")
+        return _interval(lambda seeds, episodes: ratio(seeds, seeds, episodes), *one.shape)
+    return _interval(ratio, len(one), len(other), one.shape[1])
+
+
+def crossed_improvement(first: ArrayLike, second: ArrayLike) -> tuple[float, Interval]:
+    """Probability that a first policy does better than a second in an episode, and its interval.
+
+    Every seed of one meets every seed of the other, on the same episodes; ties count half. For the
+    interval, both have their seeds drawn for themselves, and one draw of episodes.
+
+    Args:
+        first: Scores of the first policy, less being better, (episodes,) or (seeds, episodes).
+        second: The same of the second policy, with its own number of seeds.
+
+    Raises:
+        ValueError: If the numbers of episodes differ.
+    """
+    one, other = _tables(first, second)
+    better = 0.5 - 0.5 * np.sign(one[:, None] - other[None])
+
+    def share(ours: Any, theirs: Any, episodes: Any) -> Any:
+        drawn = ours[:, :, None, None], theirs[:, None, :, None], episodes[:, None, None, :]
+        return better[drawn].mean(axis=(1, 2, 3))
+
+    return float(better.mean()), _interval(share, len(one), len(other), one.shape[1])
 
 
 def interquartile_mean(values: Any, axis: int = -1) -> Any:
@@ -161,19 +186,26 @@ def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array
     """Share of episodes with a score up to each threshold, and its pointwise 95 % interval.
 
     Args:
-        values: A score per episode, (episodes,).
+        values: A score per episode, (episodes,), or per seed and episode, (seeds, episodes).
         thresholds: Thresholds, (thresholds,).
 
     Returns:
         Shares, (thresholds,), and their lower and upper limits, (2, thresholds).
     """
-    sample = np.asarray(values, np.float64)
-    below = sample[:, None] <= np.asarray(thresholds, np.float64)
-    shares = below.mean(axis=0)
-    drawn = np.random.default_rng(0).multinomial(
-        sample.size, np.full(sample.size, 1 / sample.size), RESAMPLES
+    table = np.atleast_2d(np.asarray(values, np.float64))
+    below = (table[:, :, None] <= np.asarray(thresholds, np.float64)).astype(np.float64)
+    rng = np.random.default_rng(0)
+    often = [
+        rng.multinomial(size, np.full(size, 1 / size), RESAMPLES) for size in table.shape[::-1]
+    ]
+    drawn = np.concatenate(
+        [
+            np.einsum("re,ret->rt", episodes, np.tensordot(seeds, below, 1), optimize=True)
+            for episodes, seeds in zip(*(np.array_split(o, PARTS) for o in often), strict=True)
+        ]
     )
-    return shares, np.quantile(drawn @ below / sample.size, (0.025, 0.975), axis=0)
+    limits = np.quantile(drawn / table.size, (0.025, 0.975), axis=0)
+    return below.mean(axis=(0, 1)), limits
 
 
 def _interval(statistic: Callable[..., Any], *sizes: int) -> Interval:
@@ -198,6 +230,14 @@ def _draws(rng: np.random.Generator, size: int) -> Iterator[NDArray[np.int64]]:
     """Draw indices below `size` part by part, (resamples of the part, size)."""
     for part in np.array_split(np.arange(RESAMPLES), PARTS):
         yield rng.integers(size, size=(part.size, size))
+
+
+def _tables(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
+    """Scores of two policies as (seeds, episodes), on the same episodes."""
+    one, other = (np.atleast_2d(np.asarray(scores, np.float64)) for scores in (first, second))
+    count = one.shape[1]
+    require(other.shape[1] == count, "episodes of the second", other.shape[1], f"{count}")
+    return one, other
 
 
 def _crossed(table: Array, seeds: Any, episodes: Any) -> Array:

@@ -46,7 +46,7 @@ COMMANDS = {
     "tune": ["tune", "sta", "--trials", "20", "--episodes", "3", "--output", "sta.json"],
     "leaderboard": ["leaderboard", "--policies", "sta,pd", "--output", "mine"],
     "study": [
-        *("study", "residual", "--only", "residual-sac", "--seeds", "2", "--steps", "16"),
+        *("study", "residual", "--only", "residual-ppo", "--seeds", "2", "--steps", "16"),
         *("--episodes", "4", "--output", "mine"),
     ],
 }
@@ -69,9 +69,10 @@ def shrink():
     Plan.scenario = lambda plan, random: brief(sample(plan, random))
     for module in (validation, scores, dissection):
         module.unseen = lambda *of, unseen=module.unseen: [brief(each) for each in unseen(*of)]
-    plans.RIVALS = ("sta", "zero")
-    plans.PLANS["residual-sac"] = replace(plans.PLANS["residual-sac"], interval=8)
-    scores.TRANSFER = {"still": plans.TRANSFER["still"]}
+    SETTINGS["ppo"] |= {"robots": 4, "n_steps": 2, "batch_size": 8}
+    plans.RIVALS["field"] = ("sta", "zero")
+    plans.ELSEWHERE["field"] = {"still": plans.ELSEWHERE["field"]["still"]}
+    plans.PLANS["residual-ppo"] = replace(plans.PLANS["residual-ppo"], interval=8)
     dissection.SEGMENT, dissection.LONGEST_SHIFT = 16, 2
     registry._entries["sta"] = replace(registry._entries["sta"], space=SPACE)
     tuned = tuning.sample

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from unittest.mock import patch
 
+import numpy as np
+from usm_agents.learning.checkpoint import CURVE
+from usm_agents.study import scores as scoring
+from usm_agents.study.results import StudyResult
+from usm_agents.study.trainings import planned
 from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, Summary
 
+from usm_gym import statistics
+from usm_gym.evaluation import Evaluation, metric_names
+from usm_gym.robot import Robot
+from usm_gym.support.files import write_json
 from usm_gym.support.results import Provenance
 from usm_gym.task.scenario import Scenario
+from usm_gym.world import world_of
 
 PROVENANCE = Provenance(
     version="0.1.0", commit=None, packages={"python": "3"}, seeds={}, command="usm"
@@ -48,3 +61,29 @@ def evaluation(
         refused={},
         provenance=PROVENANCE,
     )
+
+
+def study(names: Sequence[str], seeds: int, episodes: int) -> StudyResult:
+    """Return a study of agents that learn by estimates, whose scores are drawn at random."""
+    random = np.random.default_rng(0)
+    metrics = metric_names(world_of(Robot()), by_shift=True)
+    few = patch.object(statistics, "RESAMPLES", 100)
+    with few, TemporaryDirectory() as folder:
+        chosen = planned(names, seeds, Path(folder))
+        for training in chosen:
+            training.folder.mkdir(parents=True)
+            points = [dict.fromkeys(metrics, 1e-3 / (k + 1)) for k in range(3)]
+            for k, point in enumerate(points):
+                point |= {"steps": 100 * k, "seconds": 1.0, "failures": 0}
+            write_json(training.folder / CURVE, points)
+        rivals = scoring.rivals(chosen)
+        outcomes = {
+            scoring.Key(home, policy, where): Evaluation(
+                {name: random.lognormal(-6.0, 0.5, episodes) for name in metrics},
+                np.zeros(episodes, bool),
+            )
+            for home, others in rivals.items()
+            for where in home.sets
+            for policy in (*others, *(training.folder.name for training in chosen))
+        }
+        return scoring.study(chosen, rivals, outcomes, episodes, PROVENANCE)

@@ -72,7 +72,7 @@ COMMANDS = {
     "robustness": ["--vary", "noise"],
     "tune": ["sta", "--trials", "2", "--output", "tuned.json"],
     "train": ["--output", "agent"],
-    "study": ["residual", "--output", "study"],
+    "study": ["residual", "--only", "scale-6", "--output", "study"],
     "watch": ["--output", "film.mp4"],
     "report": ["result.json", "--output", "page.html"],
     "reproduce": [],

@@ -12,6 +12,7 @@ import scipy
 from usm_gym import statistics
 from usm_gym.statistics import (
     compare,
+    crossed_improvement,
     improvement,
     interquartile_mean,
     interval,
@@ -109,6 +110,40 @@ def test_where_scenarios_cancel_a_ratio_is_one_of_seeds() -> None:
         ratio_interval(tables[0], scenarios[:-1])
 
 
+def test_the_seeds_of_one_training_are_drawn_once_for_both_scores() -> None:
+    scores = np.random.default_rng(10).exponential(size=(4, 20))
+    assert ratio_interval(0.5 * scores, scores, same_seeds=True) == pytest.approx((0.5, 0.5))
+    low, high = ratio_interval(0.5 * scores, scores)
+    assert low < 0.5 < high
+    with pytest.raises(ValueError, match="seeds of the second"):
+        ratio_interval(scores, scores[:3], same_seeds=True)
+
+
+def test_a_crossed_improvement_counts_all_pairs_of_seeds_in_an_episode() -> None:
+    rng, source = np.random.default_rng(11), random.Random(1)
+    one = rng.integers(4, size=(3, 9)).astype(float)
+    other = rng.integers(5, size=(4, 9)).astype(float)
+
+    def counted(ours: list[int], theirs: list[int], episodes: list[int]) -> float:
+        wins = [
+            1.0 if one[i, e] < other[j, e] else 0.5 if one[i, e] == other[j, e] else 0.0
+            for i in ours
+            for j in theirs
+            for e in episodes
+        ]
+        return fmean(wins)
+
+    value, found = crossed_improvement(one, other)
+    assert value == pytest.approx(counted([0, 1, 2], [0, 1, 2, 3], list(range(9))))
+    draws = [[source.choices(range(n), k=n) for n in (3, 4, 9)] for _ in range(10_000)]
+    low, high = np.quantile([counted(*draw) for draw in draws], (0.025, 0.975))
+    assert found == pytest.approx((low, high), abs=0.04 * (high - low))
+    # Against a policy without seeds it is the share of the differences.
+    share, limits = crossed_improvement(one, other[0])
+    assert share == pytest.approx(improvement((one - other[0]).ravel()))
+    assert limits == pytest.approx(interval(improvement, one - other[0]), abs=0.02)
+
+
 def test_a_ratio_is_of_pairs_and_its_interval_covers_the_truth() -> None:
     rng = np.random.default_rng(2)
     episodes = rng.exponential(size=60)
@@ -170,3 +205,13 @@ def test_a_performance_profile_is_a_distribution_function() -> None:
     assert (low <= shares).all()
     assert (shares <= high).all()
     assert 0.1 < low[1] < 0.45 < 0.55 < high[1] < 0.9
+
+
+def test_a_profile_over_seeds_draws_seeds_and_episodes_each_for_themselves() -> None:
+    table = np.random.default_rng(12).lognormal(size=(3, 1)) + np.arange(10.0) / 5
+    thresholds = np.quantile(table, (0.3, 0.6))
+    shares, limits = statistics.performance_profile(table, thresholds)
+    for share, limit, threshold in zip(shares, limits.T, thresholds, strict=True):
+        below = (table <= threshold).astype(float)
+        assert share == pytest.approx(below.mean())
+        assert limit == pytest.approx(interval(np.mean, below), abs=0.05)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from usm_agents.study.results import MAIN_MODE, Rival, StudyResult, Trained
+from usm_agents.study.results import HomeResult, StudyResult
 from usm_baselines.benchmark.leaderboard import MAIN, LeaderboardResult, suites
 from usm_baselines.benchmark.results import EvaluationResult, Scores
 from usm_baselines.benchmark.robustness import RobustnessResult
@@ -38,7 +38,7 @@ from usm_gym.support.files import read_json
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.text import figures, listed
 from usm_gym.support.validation import require
-from usm_gym.task.conditions import FIELD
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import OtherScenario
@@ -187,7 +187,7 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
         "no policies: a reproduction has its own laws",
     )
     require(choice.scenario == 0, "--scenario", choice.scenario, "0: a reproduction has one")
-    chosen = {case.row: case for case in cases(step) if case.mode == MAIN_MODE}
+    chosen = {case.row: case for case in cases(step) if case.mode == "operation"}
     records = {}
     for name, record in side_by_side(run_case, chosen, os.cpu_count() or 1):
         records[name] = record
@@ -226,44 +226,47 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
 
 
 def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
-    """Trained agents beside the classical policies."""
-    everyone: dict[str, Trained | Rival] = {
-        **result.agents,
-        **result.rivals,
-        **result.ablations,
-    }
-    tables: dict[str, dict[str, Scores]] = {}
-    for name, row in everyone.items():
-        for kind, scores in row.scores.items():
-            tables.setdefault(f"{row.mode}, {kind}", {})[name] = scores
-    home = by_objective(
-        {
-            name: row.scores[result.home]
-            for name, row in everyone.items()
-            if row.mode == MAIN_MODE and name not in result.ablations
-        }
-    )
-    episodes = unseen(MAIN_MODE, FIELD, result.seed, result.episodes)
-    trained = [rows for rows in (result.agents, result.ablations) if rows]
+    """Trained agents beside the classical policies, tier by tier; the first one is replayed."""
+    homes = result.homes.items()
+    _, first = next(iter(homes))
+    rows = by_objective({name: row.home for name, row in first.competitors.items()})
+    episodes = unseen(first.mode, PRESETS[first.tier], result.seed, result.episodes)
+    tables = [pair for name, home in homes for pair in sets(name, home).items()]
     return Chapter(
         title="Study of residual agents",
-        lead=f"{len(result.agents)} agents with several seeds, and what their parts contribute.",
-        motion=motion(home),
-        verdict=verdict(home, len(episodes)),
+        lead=f"Agents of {len(homes)} tiers with several seeds, and what their parts contribute.",
+        motion=motion(rows),
+        verdict=verdict(rows, len(episodes)),
         blocks=[
-            replay(episodes, home, result.axes, choice, progress),
+            replay(episodes, rows, first.axes, choice, progress),
             Tables(
                 "Scores",
                 f"{SCORES} All seeds together; intervals resample seeds and scenarios.",
                 "where",
-                {name: score_table(rows, {}) for name, rows in tables.items()},
+                {title: score_table(scores, {}) for title, scores in tables},
             ),
-            *(plots.learning(rows, result.axes) for rows in trained),
-            *front(home, result.axes),
+            *(plot for name, home in homes for plot in drawn(name, home)),
             names(),
             provenance(result.provenance),
         ],
     )
+
+
+def sets(name: str, home: HomeResult) -> dict[str, dict[str, Scores]]:
+    """The scores of a home's policies by the name of the table: at home, and elsewhere."""
+    tables: dict[str, dict[str, Scores]] = {}
+    for policy, row in home.rows.items():
+        places = {name: row.home, **{f"{name} to {to}": it for to, it in row.elsewhere.items()}}
+        for title, scores in places.items():
+            tables.setdefault(title, {})[row.label(policy)] = scores
+    return tables
+
+
+def drawn(name: str, home: HomeResult) -> list[Plot]:
+    """The plots of a home."""
+    found = [plots.learning(rows, home.axes) for rows in (home.agents, home.ablations) if rows]
+    found.append(plots.front({n: row.home for n, row in home.competitors.items()}, {}))
+    return [replace(plot, title=f"{plot.title}: {name}") for plot in found]
 
 
 CHAPTERS: dict[type[Result], Callable[[Any, Choice, Progress], Chapter]] = {

@@ -17,13 +17,13 @@ from usm_baselines.laws.oracle import Oracle
 from usm_agents.artifact.folder import make_agent
 from usm_agents.learning.plan import TEST_SEED
 from usm_agents.residual.task import Memory, ResidualPolicy
-from usm_agents.study.plans import AGENTS
+from usm_agents.study.plans import AGENTS, Home
 from usm_agents.study.results import Dissection, ForceShares
 from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy, is_privileged
 from usm_gym.suites import unseen
-from usm_gym.task.conditions import FIELD
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.nominal import Nominal, shared_nominal
 from usm_gym.task.scenario import Scenario
 from usm_gym.world import world_of
@@ -43,7 +43,8 @@ class ForceLog:
 
     Attributes:
         total: Commanded forces by step, before saturation, (batch, axes).
-        base: The base's part of it, where the policy is a base with an agent.
+        base: The base's part of it, where the policy is a base and an agent that adds to its
+            thrust.
     """
 
     def __init__(self, nominal: Nominal, policy: Policy, limit: float) -> None:
@@ -66,7 +67,7 @@ class ForceLog:
         self._world.allocate(observation, allocation)
         forces = allocation[:, :axes]
         self.total.append(np.einsum("bwt,bt->bw", forces, action * self._limit))
-        if isinstance(memory, Memory):
+        if isinstance(memory, Memory) and memory.base_action.size:
             self.base.append(np.einsum("bwt,bt->bw", forces, memory.base_action * self._limit))
         return action, state
 
@@ -75,7 +76,7 @@ def dissect(policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenar
     """Forces of base, residual and both, beside the needed one.
 
     Args:
-        policy: A base with an agent.
+        policy: A base with an agent that adds to its thrust.
         nominal: What both were made from.
         scenarios: Episodes of one length and one thruster limit.
 
@@ -148,12 +149,13 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
     return frequency, density
 
 
-def dissected(chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
-    """What the agents, as their seed 0, do to their bases; see `dissect`."""
+def dissected(home: Home, chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
+    """What the agents of a home that add to the thrust do to it, as their seed 0; see `dissect`."""
     made = {}
     for training in chosen:
-        if training.name in AGENTS and training.plan.seed == 0:
-            episodes = unseen(training.plan.mode, FIELD, TEST_SEED, EPISODES)
+        plan = training.plan
+        if training.name in AGENTS and plan.seed == 0 and plan.action != "estimates":
+            episodes = unseen(home.mode, PRESETS[home.tier], TEST_SEED, EPISODES)
             nominal = shared_nominal(episodes)
             policy = make_agent(nominal, str(training.folder))
             made[training.name] = dissect(policy, nominal, episodes)

@@ -2,88 +2,152 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 from usm_agents.learning.plan import Plan
-from usm_gym.task.conditions import FIELD, PRESETS, Conditions
+from usm_gym.support.validation import require
+from usm_gym.task.conditions import FIELD, PRESETS, Conditions, preset_of
+from usm_gym.task.scenario import Mode
 
 OBSERVER_STATES = ("base_rate", "base_disturbance", "base_integral", "base_alpha")
-KALMAN_STATES = (
-    "estimated_error",
-    "estimated_rate",
-    "estimated_disturbance",
-    "estimated_thrust",
-    "innovation",
-)
+ESTIMATES = ("estimated_error", "estimated_rate", "estimated_disturbance", "estimated_thrust")
+FORESEEN = ("foreseen_error_2", "foreseen_error_5", "foreseen_error_10", "foreseen_rate")
 JOINT_REFERENCES = (
     "reference_deflection",
     "reference_deflection_rate",
     "reference_deflection_acceleration",
     "bending_joints",
 )
+BASIN, SEA = PRESETS["basin"], PRESETS["sea"]
+_RESIDUAL = Plan()
+# A round of its learner takes 384 000 steps in a tier of scans.
+_ESTIMATOR = Plan(algorithm="estimator", action="estimates", steps=4_600_000, interval=380_000)
 
-# The agents that are shipped, each as its seed 0.
+# The agents that are shipped, each as its seed 0. One whose base is another agent comes after it.
 AGENTS: dict[str, Plan] = {
-    "residual-ppo": Plan(steps=2_000_000),
-    "residual-sta-tuned": Plan(base="sta-tuned", steps=1_000_000),
-    "residual-pd": Plan(base="pd", steps=1_500_000),
-    "residual-lqg": Plan(base="lqg-tuned", steps=1_500_000),
-    "residual-lqg-joints": Plan(base="lqg-joints-tuned", steps=1_500_000),
-    "residual-torpedo": Plan(env="usm_agents:USM-TorpedoResidual-v0", steps=1_000_000),
-    "rl-only": Plan(base="zero", steps=2_000_000),
-    "residual-sac": Plan(algorithm="sac", steps=400_000),
-}
-
-_SHORT = Plan(steps=1_000_000)
-_EXACT = replace(
-    FIELD,
-    coefficient_range=(1.0, 1.0),
-    current_limit=0.0,
-    deflection_range=(1.2, 1.2),
-    filter_range=(9.0, 9.0),
-)
-# What an agent owes to one decision or another: `residual-ppo` with a shorter training, less one.
-ABLATIONS: dict[str, Plan] = {
-    "reference": _SHORT,
-    "scale-3": replace(_SHORT, residual_scale=3.0),
-    "scale-6": replace(_SHORT, residual_scale=6.0),
-    # To be held against scale-6.
-    "thrusters": replace(_SHORT, action="thrusters", residual_scale=6.0),
-    "scale-12": replace(_SHORT, residual_scale=12.0),
-    "scale-40": replace(_SHORT, residual_scale=40.0),
-    "no-observer-states": replace(_SHORT, omit=OBSERVER_STATES),
-    "no-kalman-states": replace(_SHORT, omit=KALMAN_STATES),
-    "frames-not-kalman": replace(_SHORT, omit=KALMAN_STATES, frames=4),
-    "recurrent": replace(_SHORT, algorithm="recurrent-ppo"),
-    "recurrent-not-kalman": replace(_SHORT, algorithm="recurrent-ppo", omit=KALMAN_STATES),
-    "no-joint-references": replace(_SHORT, omit=JOINT_REFERENCES),
-    "no-randomisation": replace(_SHORT, conditions=_EXACT),
-    # To compare with residual-sac.
-    "td3": Plan(algorithm="td3", steps=400_000),
-    "tqc": Plan(algorithm="tqc", steps=400_000),
-}
-PLANS = AGENTS | ABLATIONS
-# Most seeds per training: more where a small difference has to be told from chance.
-SEEDS = dict.fromkeys(AGENTS, 5) | dict.fromkeys(ABLATIONS, 1)
-SEEDS |= dict.fromkeys(("reference", "no-joint-references"), 3)
-
-# Classical policies beside which the agents stand.
-RIVALS = ("sta", "sta-tuned", "pd", "pd-tuned", "lqg", "lqg-tuned", "lqg-joints-tuned", "mpc-tuned")
-# Where agents are taken that they have not been trained for.
-TRANSFER: dict[str, Conditions] = {
-    "ideal": PRESETS["ideal"],
-    # The preset of this name in 0.1.0.
-    "rough": Conditions(
-        thruster_time_constant=0.1,
-        thruster_limit=15.0,
-        position_noise=2e-4,
-        current_limit=0.1,
-        current_variation=0.05,
-        coefficient_range=(0.6, 1.5),
-        deflection_range=(0.9, 2.1),
-        filter_range=(8.0, 14.0),
+    "residual-ppo": _RESIDUAL,
+    "residual-lqg-joints": replace(_RESIDUAL, base="lqg-joints-tuned"),
+    "rl-only": replace(_RESIDUAL, base="zero"),
+    "residual-torpedo": replace(_RESIDUAL, env="usm_agents:USM-TorpedoResidual-v0"),
+    "estimator-adaptive-basin": replace(_ESTIMATOR, base="adaptive-basin", conditions=BASIN),
+    "estimator-sta-navigator-basin": replace(
+        _ESTIMATOR, base="sta-navigator-basin", conditions=BASIN
     ),
-    "still": replace(FIELD, motion=False),
-    "coefficients": replace(FIELD, coefficient_range=(0.6, 1.4)),
+    "estimator-adaptive-sea": replace(_ESTIMATOR, base="adaptive-sea", conditions=SEA),
+    "estimator-sta-navigator-sea": replace(_ESTIMATOR, base="sta-navigator-sea", conditions=SEA),
+    "residual-sta-navigator-basin": replace(
+        _RESIDUAL, base="estimator-sta-navigator-basin", conditions=BASIN
+    ),
 }
-HOME = "field"
+
+
+def exact(conditions: Conditions) -> Conditions:
+    """The same where the nominal model is right: coefficients and gains of 1, still water."""
+    return replace(
+        conditions,
+        coefficient_range=(1.0, 1.0),
+        coefficient_spread=0.0,
+        thruster_gain_range=(1.0, 1.0),
+        current_limit=0.0,
+        current_variation=0.0,
+        wave_limit=0.0,
+    )
+
+
+# The agent that ablations are made of: each is trained as it is, but for one thing.
+ABLATED = "residual-ppo"
+_EXACT = replace(exact(FIELD), deflection_range=(1.2, 1.2), filter_range=(9.0, 9.0))
+_CHANGES: dict[str, dict[str, Any]] = {
+    "no-foresight": {"omit": FORESEEN},
+    "no-estimates": {"omit": ESTIMATES},
+    "no-observer-states": {"omit": OBSERVER_STATES},
+    "no-joint-references": {"omit": JOINT_REFERENCES},
+    "no-randomisation": {"conditions": _EXACT},
+    "frames": {"frames": 4},
+    "scale-6": {"residual_scale": 6.0},
+    "scale-40": {"residual_scale": 40.0},
+    # To be held against scale-6.
+    "thrusters": {"action": "thrusters", "residual_scale": 6.0},
+}
+ABLATIONS = {name: replace(AGENTS[ABLATED], **changes) for name, changes in _CHANGES.items()}
+PLANS = AGENTS | ABLATIONS
+# Most seeds of a training.
+SEEDS = dict.fromkeys(AGENTS, 10) | dict.fromkeys(ABLATIONS, 5)
+
+# Policies beside which the agents of a tier stand, as `--policies` takes them; besides them, the
+# agents' bases.
+RIVALS: dict[str, tuple[str, ...]] = {
+    "field": ("sta", "sta-tuned", "pd-tuned", "lqg-joints", "lqg-joints-tuned", "mpc-tuned"),
+    "basin": (
+        "sta-navigator-basin",
+        "indi-basin",
+        "lqg-joints-basin",
+        "adaptive-basin",
+        "informed-basin",
+    ),
+    "sea": ("sta-navigator-sea", "indi-sea", "lqg-joints-sea", "adaptive-sea", "informed-sea"),
+}
+# Where those of a tier are taken that they have not been made for.
+ELSEWHERE: dict[str, dict[str, Conditions]] = {
+    "field": {
+        "ideal": PRESETS["ideal"],
+        "still": replace(FIELD, motion=False),
+        "exact": exact(FIELD),
+        "coefficients": replace(FIELD, coefficient_range=(0.6, 1.4)),
+        "delay": replace(FIELD, position_delay=1),
+        "noise": replace(FIELD, position_noise=1e-3),
+        "lag": replace(FIELD, thruster_time_constant=0.1),
+    },
+    "basin": {"sea": SEA, "exact": exact(BASIN)},
+    "sea": {"basin": BASIN},
+}
+
+
+@dataclass(frozen=True)
+class Home:
+    """Where an agent was trained, and is scored beside its rivals.
+
+    Attributes:
+        tier: Name of the preset of conditions.
+        mode: "operation" or "torpedo".
+    """
+
+    tier: str
+    mode: Mode
+
+    @property
+    def name(self) -> str:
+        """How it is called: the tier, and the mode if it is not that of the main suite."""
+        return self.tier if self.mode == "operation" else f"{self.mode}-{self.tier}"
+
+    @property
+    def sets(self) -> dict[str, Conditions]:
+        """The conditions of all sets of scenarios there, by name; those of the tier first."""
+        return {self.tier: PRESETS[self.tier], **ELSEWHERE[self.tier]}
+
+
+def home_of(name: str) -> Home:
+    """The home of an agent; ablations are at home where the ablated agent is.
+
+    Raises:
+        ValueError: If it was trained under conditions of no tier.
+    """
+    plan = AGENTS[ABLATED if name in ABLATIONS else name]
+    tier = preset_of(plan.conditions)
+    require(tier in RIVALS, f"conditions of {name}", plan.conditions, ", ".join(RIVALS))
+    return Home(tier, plan.mode)
+
+
+def rivals_of(home: Home, names: Iterable[str]) -> dict[str, str]:
+    """The rivals of agents at a home: as `--policies` takes them, by the name that tables show."""
+    bases = [PLANS[name].base for name in names if home_of(name) == home]
+    return {rival_name(rival): rival for rival in dict.fromkeys([*RIVALS[home.tier], *bases])}
+
+
+def rival_name(rival: str) -> str:
+    """The name of a rival: without the folder of its gains; that of an agent says it is shipped."""
+    id, at, path = rival.partition("@")
+    return f"{rival}, shipped" if rival in AGENTS else f"{id}{at}{Path(path).name}"

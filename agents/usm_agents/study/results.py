@@ -15,10 +15,7 @@ from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.metrics import MAX_ERROR, axes_of, objective
 from usm_gym.task.scenario import Mode
 
-# The mode of the main suite, whose name is left out where others are named.
-MAIN_MODE: Mode = "operation"
 Steps = Annotated[int, Field(strict=True, ge=0)]
-Share = Annotated[Number, Field(ge=0, le=1)]
 
 
 @validated
@@ -28,8 +25,8 @@ class CurvePoint(Part):
     Attributes:
         steps: After how many steps.
         seconds: After how much time, s.
-        means: Means of the largest errors by axis, m, and of the attitude, rad, which old curves
-            lack, and of the thrust variation, N/s.
+        means: Means of the largest errors by axis, m, and of the attitude, rad, and of the thrust
+            variation, N/s.
         failures: How many episodes lost the robot.
     """
 
@@ -84,54 +81,75 @@ class SeedScores(Scores):
 
 
 @validated
-class Rival:
-    """A classical policy.
+class Estimated:
+    """A number that scores say, with the interval that they leave.
 
     Attributes:
-        mode: "operation" or "torpedo".
-        scores: Its scores by the conditions.
+        value: The number.
+        ci95: Its 95 % interval, for which seeds and episodes are resampled.
     """
 
-    mode: Mode
-    scores: Mapping[str, SeedScores]
-
-
-@validated
-class Trained:
-    """An agent or an ablation, under all its seeds.
-
-    Attributes:
-        agent: Whether it is an agent that is shipped.
-        mode: "operation" or "torpedo".
-        base: Its base policy.
-        command: The command that trains it again, as its seed 0.
-        curves: Its learning curves by the seed.
-        scores: Its scores by the conditions.
-    """
-
-    agent: Switch
-    mode: Mode
-    base: str
-    command: str
-    curves: Mapping[str, tuple[CurvePoint, ...]]
-    scores: Mapping[str, SeedScores]
+    value: Number
+    ci95: Interval
 
 
 @validated
 class Claim:
-    """What an agent is to a classical policy.
+    """What one policy is to another in the same episodes.
 
     Attributes:
-        ratio: Ratios of their means over all seeds, by axis.
-        ratio_ci95: Their 95 % intervals, by axis.
-        better_in_both: In what share of scenarios the agent, as its seed 0, is better in all axes.
-        better_seeds: How many of its seeds are better in the means of all axes.
+        ratios: Ratios of their means by metric: the largest errors of position and attitude, and
+            thrust variation; without those that the other one has none of.
+        improvements: Probabilities that an episode's error is smaller, by axis.
+        better_seeds: How many of its seeds are better than the other's mean in all axes.
     """
 
-    ratio: tuple[Number, ...]
-    ratio_ci95: tuple[Interval, ...]
-    better_in_both: Share
+    ratios: Mapping[str, Estimated]
+    improvements: Mapping[str, Estimated]
     better_seeds: Failures
+
+
+@validated
+class Scored:
+    """A policy at home and elsewhere.
+
+    Attributes:
+        told: What it is told besides the measured position and the reference.
+        privileged: Whether it is given true state, and so is no competitor.
+        home: Its scores at home.
+        elsewhere: Its scores under other conditions, by their name.
+        refused: Why it cannot be taken to others, by their name.
+        adaptation: In scans, the ratio of the mean errors after the fifth and after the first
+            shift, by axis.
+    """
+
+    told: str
+    privileged: Switch
+    home: SeedScores
+    elsewhere: Mapping[str, SeedScores]
+    refused: Mapping[str, str]
+    adaptation: Mapping[str, Estimated]
+
+    def label(self, name: str) -> str:
+        """Its name in a table."""
+        return f"{name} (no competitor)" if self.privileged else name
+
+
+@validated
+class Trained(Scored):
+    """An agent or an ablation, under all its seeds.
+
+    Attributes:
+        base: Its base policy.
+        rival: The name of its base among the rivals.
+        command: The command that trains it again, as its seed 0.
+        curves: Its learning curves by the seed.
+    """
+
+    base: str
+    rival: str
+    command: str
+    curves: Annotated[Mapping[str, tuple[CurvePoint, ...]], Field(min_length=1)]
 
 
 @validated
@@ -170,57 +188,86 @@ class Dissection(Part):
 
 
 @validated
+class HomeResult:
+    """The agents of a tier and a mode, and the policies beside which they stand.
+
+    Attributes:
+        tier: Name of the preset of conditions of the trainings.
+        mode: "operation" or "torpedo".
+        agents: The agents that are shipped.
+        ablations: The others, which lack one thing or another.
+        rivals: Their rivals, among them their bases.
+        against: What agents are at home to every rival, and ablations to the ablated agent.
+        transfer: What agents are to their bases elsewhere, by the name of the conditions.
+        dissected: What agents that add to the thrust do to their bases.
+    """
+
+    tier: str
+    mode: Mode
+    agents: Mapping[str, Trained]
+    ablations: Mapping[str, Trained]
+    rivals: Annotated[Mapping[str, Scored], Field(min_length=1)]
+    against: Mapping[str, Mapping[str, Claim]]
+    transfer: Mapping[str, Mapping[str, Claim]]
+    dissected: Mapping[str, Dissection]
+
+    def __post_init__(self) -> None:
+        """Refuse rows of other axes, curves without a point, and agents without their bases."""
+        require(self.trained, "agents and ablations", "none", "one or more")
+        for name, row in self.rows.items():
+            axes = {scores.axes for scores in (row.home, *row.elsewhere.values())}
+            require(axes == {self.axes}, f"axes of {name}", axes, f"{self.axes}")
+        for name, trained in self.trained.items():
+            points = [point for curve in trained.curves.values() for point in curve]
+            whole = all(map(len, trained.curves.values()))
+            require(whole, f"curves of {name}", list(trained.curves), "one point or more")
+            known = all(tuple(point.errors) == self.axes for point in points)
+            require(known, f"curves of {name}", "other axes", f"{self.axes}")
+            bases = ", ".join(self.rivals)
+            require(trained.rival in self.rivals, f"rival of {name}", trained.rival, bases)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of the task."""
+        return next(iter(self.rivals.values())).home.axes
+
+    @property
+    def trained(self) -> dict[str, Trained]:
+        """Agents and ablations."""
+        return {**self.agents, **self.ablations}
+
+    @property
+    def competing(self) -> dict[str, Scored]:
+        """Agents and rivals."""
+        return {**self.agents, **self.rivals}
+
+    @property
+    def competitors(self) -> dict[str, Scored]:
+        """Agents and rivals that know no more than a vehicle does."""
+        return {name: row for name, row in self.competing.items() if not row.privileged}
+
+    @property
+    def rows(self) -> dict[str, Scored]:
+        """All policies."""
+        return {**self.trained, **self.rivals}
+
+
+@validated
 class StudyResult(Result):
     """The study of residual agents, as `usm study` writes it.
 
     Attributes:
         study: What is studied.
-        home: The conditions of the trainings.
         seed: Seed of the scenarios.
-        rows: Agents and ablations.
-        rivals: Classical policies.
-        against: How the agents compare with the classical policies of their mode.
         episodes: How many scenarios there are at home; half as many elsewhere.
-        dissected: What the agents do to their bases.
+        homes: The tiers, by name.
         provenance: Where all this comes from.
     """
 
     kind: ClassVar[str] = "study"
+    form: ClassVar[int] = 2
     study: str
-    home: str
     seed: Annotated[int, Field(strict=True, ge=0)]
-    rows: Annotated[Mapping[str, Trained], Field(min_length=1)]
-    rivals: Mapping[str, Rival]
-    against: Mapping[str, Mapping[str, Claim]]
     episodes: Count
-    dissected: Mapping[str, Dissection]
+    homes: Annotated[Mapping[str, HomeResult], Field(min_length=1)]
     provenance: Provenance
-
-    def __post_init__(self) -> None:
-        """Refuse rows without scores at home, or without a curve, and rows of other axes."""
-        everyone: dict[str, Trained | Rival] = {**self.rows, **self.rivals}
-        for name, row in everyone.items():
-            require(self.home in row.scores, f"scores of {name}", list(row.scores), self.home)
-            axes = {scores.axes for scores in row.scores.values()}
-            require(axes == {self.axes}, f"axes of {name}", axes, f"{self.axes}")
-        for name, trained in self.rows.items():
-            points = [point for curve in trained.curves.values() for point in curve]
-            whole = points and all(map(len, trained.curves.values()))
-            require(whole, f"curves of {name}", list(trained.curves), "one point or more")
-            known = all(tuple(point.errors) == self.axes for point in points)
-            require(known, f"curves of {name}", "other axes", f"{self.axes}")
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """The axes of the task."""
-        return next(iter(self.rows.values())).scores[self.home].axes
-
-    @property
-    def agents(self) -> dict[str, Trained]:
-        """The agents that are shipped."""
-        return {name: row for name, row in self.rows.items() if row.agent}
-
-    @property
-    def ablations(self) -> dict[str, Trained]:
-        """The others, which lack one thing or another."""
-        return {name: row for name, row in self.rows.items() if not row.agent}

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, TypeAdapter
+from usm_baselines.registry import ids
 
 from usm_agents.artifact.folder import read_agent, write_agent
 from usm_agents.learning.checkpoint import CURVE, traces
@@ -17,7 +18,10 @@ from usm_agents.study.plans import AGENTS, PLANS, SEEDS
 from usm_agents.study.results import CurvePoint
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json
-from usm_gym.support.validation import explaining, require
+from usm_gym.support.validation import UsageError, explaining, require
+
+# Where shipped agents are in a checkout, in which they are registered by their names.
+SHIPPED = "agents/usm_agents/artifact/pretrained"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,17 +90,33 @@ def planned(
         steps: How many steps a training takes; without it, as its plan says.
 
     Raises:
-        ValueError: If a name is unknown.
+        ValueError: If a name is unknown, or the base of an agent is another one that is not
+            shipped yet.
     """
     listed = []
+    for name in names:
+        require(name in PLANS, "--only", name, ", ".join(PLANS))
+        require_base(name)
     for seed in range(seeds):
         for name in names:
-            require(name in PLANS, "--only", name, ", ".join(PLANS))
             if seed >= SEEDS[name]:
                 continue
             plan = dataclasses.replace(PLANS[name], seed=seed, steps=steps or PLANS[name].steps)
             listed.append(StudyTraining(name, plan, folder / "runs" / f"{name}-{seed}"))
     return listed
+
+
+def require_base(name: str) -> None:
+    """Refuse an agent whose base is an agent of the study that is not shipped.
+
+    A base is a registered policy, so that what is trained on it is what users get.
+    """
+    base = PLANS[name].base
+    if base in AGENTS and base not in ids():
+        raise UsageError(
+            f"the base of {name} is {base}, which is not shipped: first "
+            f"usm study residual --only {base} --ship {SHIPPED}"
+        )
 
 
 def train_all(

@@ -75,6 +75,17 @@ def test_an_agent_read_back_is_the_agent_to_the_bit(folder):
         assert (read.per_episode[name] == values).all()
 
 
+def test_where_positions_are_measured_worse_an_agent_sees_errors_on_the_scale_of_that_place(folder):
+    conditions = dataclasses.replace(SUITE[0].conditions, position_noise=1e-3)
+    noisy = [dataclasses.replace(SUITE[0], conditions=conditions)]
+    residual = Residual(noisy[0].nominal, residual_scale=2.0)
+    assert residual.layout.fingerprint != Residual(NOMINAL).layout.fingerprint
+    ours = usm_gym.evaluate(ResidualPolicy(residual, network(residual.layout.size)), noisy)
+    read = usm_gym.evaluate(make_agent(noisy[0].nominal, str(folder)), noisy)
+    for name, values in ours.per_episode.items():
+        assert (read.per_episode[name] == values).all()
+
+
 def test_a_network_answers_alike_for_one_and_for_many():
     net = network(44)
     seen = np.random.default_rng(1).normal(size=(50, 44)).astype(np.float32)
@@ -156,6 +167,8 @@ def in_bfloat16(folder):
         (lambda folder: change(folder, gains={"surface": 1e300}), "surface"),
         (lambda folder: change(folder, layout="0123"), "observation layout"),
         (lambda folder: change(folder, action="thrusters"), "observation layout"),
+        (lambda folder: change(folder, conditions={"position_noise": 1e-3}), "observation layout"),
+        (lambda folder: change(folder, conditions={"salt": 1}), "salt"),
         (lambda folder: change(folder, base="nobody"), "policy is 'nobody'"),
         (lambda folder: change(folder, base="os:system"), "policy is 'os:system'"),
         (lambda folder: change(folder, gains={"surface": "1"}), "gains"),
