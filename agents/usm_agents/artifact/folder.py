@@ -10,7 +10,6 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,7 +24,6 @@ from usm_baselines.gains import Gain
 from usm_baselines.registry import POSITION_ONLY, entry, make, register
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
-from usm_agents.residual.observation import DEVIATIONS, SHORT
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
 from usm_gym.support.provenance import older_plant
@@ -194,14 +192,22 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     """
     agent, network = read_agent(Path(folder))
     base = make(agent.base, nominal, **agent.gains)
-    residual = Residual(nominal, base, agent.residual_scale, agent.action, agent.omit, agent.frames)
-    # Where positions are measured otherwise than in its training, errors are shown on a scale of
-    # that place, and all else has to be as in training.
-    noise = conditions_of(agent.conditions).position_noise
-    length = max(SHORT, DEVIATIONS * noise)
-    layout = replace(residual.layout, length=length).fingerprint
-    name = f"observation layout of {folder}"
-    require(agent.layout == layout, name, agent.layout, f"{layout}, that of this version")
+    residual = Residual(
+        nominal,
+        base,
+        agent.residual_scale,
+        agent.action,
+        agent.omit,
+        agent.frames,
+        # What the numbers of its network mean does not change with the place.
+        conditions_of(agent.conditions).position_noise,
+    )
+    require(
+        agent.layout == residual.layout.fingerprint,
+        f"observation layout of {folder}",
+        agent.layout,
+        f"{residual.layout.fingerprint}, that of this version",
+    )
     sizes = (network.inputs, network.outputs)
     fitting = (residual.layout.size, residual.actions)
     require(sizes == fitting, f"inputs and outputs of {folder}", sizes, str(fitting))

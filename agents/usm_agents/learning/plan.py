@@ -43,7 +43,7 @@ class Plan:
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, 1e-6 to 1000 N and N m.
-        action: What the action is: "wrench", "thrusters" or "estimates".
+        action: What the action is: "force", "wrench", "thrusters" or "estimates".
         omit: Entries of the observation that the agent is not shown.
         frames: How many observations it sees at once, 1 to 100.
         conditions: Conditions from which scenarios are sampled.
@@ -56,13 +56,13 @@ class Plan:
     env: str = "usm_agents:USM-OperationResidual-v0"
     base: str = "sta"
     residual_scale: ResidualScale = RESIDUAL_SCALE
-    action: ActionKind = "wrench"
+    action: ActionKind = "force"
     omit: tuple[str, ...] = ()
     frames: Frames = 1
     conditions: Conditions = FIELD
     seed: Seed = 0
-    steps: Steps = 3_000_000
-    interval: Steps = 250_000
+    steps: Steps = 1_000_000
+    interval: Steps = 100_000
 
     def __post_init__(self) -> None:
         """Refuse what cannot be trained."""

@@ -9,10 +9,9 @@ from typing import Any
 
 # Rewards are multiplied by this in training, so that returns are of order one.
 REWARD_SCALE = 0.1
-# What is taken from them for each N/s of thrust variation. In the objective, by which agents are
-# chosen, 500 N/s cost as much as a largest error of 1 mm in one axis, and a mean error is about a
-# third of the largest.
-VARIATION_PRICE = 2e-4
+# What is taken from them for each N/s of thrust variation, which the environment's reward leaves
+# free and the objective, by which agents are chosen, does not.
+VARIATION_PRICE = 1e-4
 
 _PPO: dict[str, Any] = {
     "hidden": (64, 64),  # widths of the hidden layers

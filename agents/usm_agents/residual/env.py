@@ -30,9 +30,10 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 
     ## Action
 
-    `Box(-1, 1)` in units of `residual_scale`. "wrench": force in x and y (N, global frame) and
-    moment (N m) on the centre of mass, shared out to the thrusters with least norm. "thrusters":
-    forces of the thrusters (N).
+    `Box(-1, 1)` in units of `residual_scale`. "force": force in x and y (N, global frame) on the
+    centre of mass, without a moment, shared out to the thrusters with least norm. "wrench": the
+    same with a moment (N m). "thrusters": forces of the thrusters (N). "estimates": what is added
+    to error, rate and disturbance in each axis, in units of the largest corrections.
 
     ## Observation
 
@@ -102,7 +103,7 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 # The class docstring is the specification; its table comes from the one that the code uses.
 ResidualEnv.__doc__ = (ResidualEnv.__doc__ or "").replace(
     "OBSERVATION_TABLE",
-    ResidualLayout(5, 3, base_entries(SuperTwisting.shown)).table().replace("\n", "\n    "),
+    ResidualLayout(5, 2, base_entries(SuperTwisting.shown)).table().replace("\n", "\n    "),
 )
 
 

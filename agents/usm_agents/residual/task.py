@@ -97,9 +97,10 @@ class Residual:
         nominal: Nominal,
         base: str | Policy = "sta",
         residual_scale: float = RESIDUAL_SCALE,
-        action: ActionKind = "wrench",
+        action: ActionKind = "force",
         omit: Sequence[str] = (),
         frames: int = 1,
+        position_noise: float | None = None,
     ) -> None:
         """Make the base.
 
@@ -108,10 +109,13 @@ class Residual:
             base: The base policy: a name as `--policies` takes it, or the policy itself.
             residual_scale: Largest residual force per axis or per thruster, N, and largest
                 residual moment, N m; 1e-6 to 1000.
-            action: What the agent's answer is added to: the "wrench" or the forces of the
-                "thrusters" that the base commands, or the "estimates" that it acts on.
+            action: What the agent's answer is added to: the "force" on the centre of mass, the
+                "wrench" or the forces of the "thrusters" that the base commands, or the "estimates"
+                that it acts on.
             omit: Entries of the observation that the agent is not shown, by name.
             frames: How many observations the agent sees at once, the latest last, 1 to 100.
+            position_noise: Standard deviation of a measured position by which errors are scaled for
+                the agent, m; by default that of the nominal knowledge.
 
         Raises:
             ValueError: If the base is unknown or an argument not allowed.
@@ -155,13 +159,13 @@ class Residual:
         }
         self.actions = numbers[action]
         self._estimator = Estimator(nominal)
-        length = max(SHORT, DEVIATIONS * nominal.position_noise)
+        noise = nominal.position_noise if position_noise is None else position_noise
+        length = max(SHORT, DEVIATIONS * noise)
         self._observer = ResidualObserver(
             base, plain, self.actions, length, tuple(omit), frames, action == "estimates"
         )
         self.layout = self._observer.layout
-        deviation = max(nominal.position_noise, LEAST_DEVIATION)
-        self.correction = deviation * np.array(LARGEST_CORRECTION)
+        self.correction = max(noise, LEAST_DEVIATION) * np.array(LARGEST_CORRECTION)
 
     @property
     def corrects(self) -> bool:
