@@ -13,9 +13,9 @@ from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
 
 DESCRIPTION = """\
-Train an agent that adds residual thrust to a base policy, or corrects what the base believes. It
-first prints the schedule: what is trained, with which settings, and how often it is validated. The
-progress bar shows the last validation: mean largest errors x / y, heading, and thrust variation. The
+Train an agent that adds residual thrust to a base policy, or corrects what the base believes. The
+command first prints what it trains, with which settings, and how often it validates. The progress
+bar shows the last validation: mean largest errors x / y, heading error, and thrust variation. The
 folder then holds the agent, which --policies takes, its learning curve on held-out scenarios of the
 training distribution, logs for TensorBoard, and the last checkpoint. Training never uses frozen
 suites. `usm train --resume --output DIR` continues from the last checkpoint and ends as if it had
