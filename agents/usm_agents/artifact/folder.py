@@ -22,6 +22,7 @@ from safetensors.numpy import load, save
 from usm_baselines.contender import Contender, fingerprint
 from usm_baselines.gains import Gain
 from usm_baselines.registry import POSITION_ONLY, entry, make, register
+from usm_baselines.tiers import TIERS, tier_of
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
@@ -45,7 +46,7 @@ RECURRENCE = "recurrence_"  # begins the names of its arrays
 LARGEST_WEIGHTS = 256 * 2**20  # bytes
 PRETRAINED = Path(__file__).with_name("pretrained")
 # What agents are told besides what their base is, by their estimator and their observation.
-TOLD = ("lag", "noise", "straight body", "joint references")
+TOLD = ("lag", "noise", "delays", "nominal plant", "joint references")
 
 
 @validated
@@ -246,7 +247,9 @@ def register_shipped() -> None:
         agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
         told, note = told_with(agent["base"]), note_of(agent["training"])
-        register(folder.name, factory, agent["summary"], told=told, note=note)
+        tier = tier_of(conditions_of(agent["conditions"]))
+        summary, tuned_for = agent["summary"], tier if tier in TIERS else ""
+        register(folder.name, factory, summary, told=told, note=note, tuned_for=tuned_for)
 
 
 def note_of(training: Mapping[str, Any]) -> str:
