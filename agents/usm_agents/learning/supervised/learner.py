@@ -89,10 +89,11 @@ class Corrector(nn.Module):
 class EstimatorLearner:
     """Learns to correct the estimates that a law acts on; a `Learner` for the action "estimates".
 
-    Settings: robots; rounds whose data are kept; the least updates of a fit, which ends with the pass
-    through the data that reaches them; robots of a batch; control
-    periods from one observation that the memory takes in to the next, and through how many of these
-    gradients go; learning rate; weight decay; units of the memory, width of the hidden layer.
+    Settings: robots; control periods over which the disturbance is meant; rounds whose data are
+    kept; updates of the network in a round, after which the pass through the data is ended; robots
+    of a batch; control periods from one observation that the memory takes in to the next, and
+    through how many of these gradients go; learning rate; weight decay; units of the memory, width
+    of the hidden layer.
     """
 
     def __init__(self, setup: TrainingSetup) -> None:
@@ -179,7 +180,8 @@ class EstimatorLearner:
             for parts in zip(*self._rounds, strict=True)
         )
         period = settings["memory_period"]
-        span, instants, losses = settings["window"] * period, len(seen) // period, []
+        span, instants = settings["window"] * period, len(seen) // period
+        losses: list[float] = []
         while len(losses) < settings["updates"]:
             order = torch.from_numpy(self._random.permutation(seen.shape[1]))
             for robots in order.split(settings["batch"]):
