@@ -49,9 +49,10 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "estimator": {
         "robots": 128,
-        "horizon": 1,  # control periods over which the disturbance is meant
+        "horizon": 5,  # control periods over which the disturbance is meant
         "kept": 12,  # rounds that are fitted
-        "updates": 1200,  # of the network in a round, or a few more
+        # More, when there are few rounds yet, would fit what the corrected law no longer meets.
+        "epochs": 8,
         "batch": 32,  # robots
         "memory_period": 5,  # control periods from one observation that the memory takes in on
         "window": 100,  # of these observations, through which gradients go

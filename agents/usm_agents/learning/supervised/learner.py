@@ -90,10 +90,9 @@ class EstimatorLearner:
     """Learns to correct the estimates that a law acts on; a `Learner` for the action "estimates".
 
     Settings: robots; control periods over which the disturbance is meant; rounds whose data are
-    kept; updates of the network in a round, after which the pass through the data is ended; robots
-    of a batch; control periods from one observation that the memory takes in to the next, and
-    through how many of these gradients go; learning rate; weight decay; units of the memory, width
-    of the hidden layer.
+    kept; epochs of a fit; robots of a batch; control periods from one observation that the memory
+    takes in to the next, and through how many of these gradients go; learning rate; weight decay;
+    units of the memory, width of the hidden layer.
     """
 
     def __init__(self, setup: TrainingSetup) -> None:
@@ -182,7 +181,7 @@ class EstimatorLearner:
         period = settings["memory_period"]
         span, instants = settings["window"] * period, len(seen) // period
         losses: list[float] = []
-        while len(losses) < settings["updates"]:
+        for _ in range(settings["epochs"]):
             order = torch.from_numpy(self._random.permutation(seen.shape[1]))
             for robots in order.split(settings["batch"]):
                 its = [part[: instants * period, robots] for part in (seen, wanted, valid)]

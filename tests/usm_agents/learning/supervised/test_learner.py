@@ -35,7 +35,7 @@ def silent(steps, line):
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Four robots, episodes of two seconds, so that a round has 400 steps."""
-    few = {"robots": 4, "updates": 20, "units": 8, "hidden": 8, "window": 5, "batch": 2}
+    few = {"robots": 4, "units": 8, "hidden": 8, "window": 5, "batch": 2}
     monkeypatch.setitem(SETTINGS, "estimator", SETTINGS["estimator"])
     for name, value in few.items():
         monkeypatch.setitem(SETTINGS["estimator"], name, value)
