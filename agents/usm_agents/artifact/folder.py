@@ -27,7 +27,6 @@ from usm_baselines.tiers import TIERS, tier_of
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
-from usm_gym.support.provenance import older_plant
 from usm_gym.support.validation import (
     Count,
     UsageError,
@@ -236,8 +235,7 @@ def agent_contender(folder: str) -> Contender:
     description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
     identity = json.dumps([agent.weights, description, sources])
     factory, told = partial(make_agent, folder=folder), told_with(agent.base)
-    note = note_of(agent.training)
-    return Contender(folder, factory, told=told, note=note, identity=identity)
+    return Contender(folder, factory, told=told, identity=identity)
 
 
 def register_shipped() -> None:
@@ -246,15 +244,7 @@ def register_shipped() -> None:
         folder = description.parent
         agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
-        told, note = told_with(agent["base"]), note_of(agent["training"])
+        told = told_with(agent["base"])
         tier = tier_of(conditions_of(agent["conditions"]))
         summary, tuned_for = agent["summary"], tier if tier in TIERS else ""
-        register(folder.name, factory, summary, told=told, note=note, tuned_for=tuned_for)
-
-
-def note_of(training: Mapping[str, Any]) -> str:
-    """What to bear in mind about an agent of such a training."""
-    said = training.get("provenance")
-    version = said.get("version") if isinstance(said, Mapping) else None
-    known = isinstance(version, str) and older_plant(version)
-    return f"trained on the plant of {version}" if known else ""
+        register(folder.name, factory, summary, told=told, tuned_for=tuned_for)
