@@ -30,7 +30,7 @@ SUITE = usm_gym.suite("operation")[:2]
 NOMINAL = SUITE[0].nominal
 
 
-def network(inputs, outputs=3):
+def network(inputs, outputs=2):
     rng = np.random.default_rng(0)
     sizes = (inputs, 8, outputs)
     weights = [rng.normal(0, 0.3, pair).astype(np.float32) for pair in pairwise(sizes)]
@@ -48,7 +48,7 @@ def folder(tmp_path):
         "base": "sta",
         "gains": residual.base.gains._asdict(),
         "residual_scale": 2.0,
-        "action": "wrench",
+        "action": "force",
         "omit": [],
         "frames": 1,
         "layout": residual.layout.fingerprint,
@@ -75,13 +75,17 @@ def test_an_agent_read_back_is_the_agent_to_the_bit(folder):
         assert (read.per_episode[name] == values).all()
 
 
-def test_where_positions_are_measured_worse_an_agent_sees_errors_on_the_scale_of_that_place(folder):
-    conditions = dataclasses.replace(SUITE[0].conditions, position_noise=1e-3)
-    noisy = [dataclasses.replace(SUITE[0], conditions=conditions)]
-    residual = Residual(noisy[0].nominal, residual_scale=2.0)
-    assert residual.layout.fingerprint != Residual(NOMINAL).layout.fingerprint
-    ours = usm_gym.evaluate(ResidualPolicy(residual, network(residual.layout.size)), noisy)
-    read = usm_gym.evaluate(make_agent(noisy[0].nominal, str(folder)), noisy)
+def test_an_agent_sees_errors_on_the_scale_of_its_training_wherever_it_is_taken(folder):
+    (there,) = usm_gym.suite("operation-basin")[:1]
+    there = dataclasses.replace(there, duration=2.0, settle_time=0.5)
+    home = Residual(NOMINAL).layout
+    assert Residual(there.nominal).layout.fingerprint != home.fingerprint
+    residual = Residual(
+        there.nominal, residual_scale=2.0, position_noise=SUITE[0].conditions.position_noise
+    )
+    assert residual.layout.fingerprint == home.fingerprint
+    ours = usm_gym.evaluate(ResidualPolicy(residual, network(home.size)), [there])
+    read = usm_gym.evaluate(make_agent(there.nominal, str(folder)), [there])
     for name, values in ours.per_episode.items():
         assert (read.per_episode[name] == values).all()
 

@@ -73,7 +73,7 @@ def test_every_entry_of_the_table_is_filled_in(base, robot):
     rng = np.random.default_rng(0)
     half = layout.size // 2
     memory, start = None, np.ones(3, bool)
-    last, earlier = np.zeros((3, 3)), np.zeros((3, half), np.float32)
+    last, earlier = np.zeros((3, residual.actions)), np.zeros((3, half), np.float32)
     for _ in range(30):
         observation = rng.normal(0.0, 0.3, (3, plain.size)).astype(np.float32)
         # Joints that do not bend have references of 0.
@@ -88,7 +88,7 @@ def test_every_entry_of_the_table_is_filled_in(base, robot):
         earlier = np.where(start[:, None], seen[:, half:], earlier)
         assert seen[:, :half].tobytes() == earlier.tobytes()
         earlier = seen[:, half:]
-        last = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
+        last = rng.uniform(-1.0, 1.0, last.shape).astype(np.float32)
         _, memory = residual.command(memory, last)
         start = rng.random(3) < 0.2
 

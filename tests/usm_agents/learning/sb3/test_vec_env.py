@@ -129,7 +129,7 @@ def test_the_residual_task_is_one_too():
     for _ in range(700):
         actions, state = policy.predict(observations, state, done)
         observations, rewards, done, infos = plain.step(actions)
-        seen, its_rewards, its_done, its_infos = scaled.step(np.zeros((3, 3), np.float32))
+        seen, its_rewards, its_done, its_infos = scaled.step(np.zeros((3, 2), np.float32))
         np.testing.assert_allclose(its_rewards, 0.1 * rewards, rtol=1e-6)
         assert (its_done == done).all()
         for index in np.flatnonzero(done):
