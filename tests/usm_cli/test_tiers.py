@@ -48,7 +48,7 @@ def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys):
 
 def test_tables_of_scans_are_readable_on_120_columns(chosen, tmp_path):
     longest = max((id for id in usm_baselines.ids() if "basin" in id), key=len)
-    chosen("--suite", "operation-basin", "--policies", f"{longest},mine-basin")
+    chosen("--suite", "operation-basin", "--policies", f"{longest},pd-navigator-basin")
     result = evaluate.EvaluationResult.read(tmp_path / "result.json")
     for table in (evaluate.table(result), evaluate.shift_table(result)):
         console = Console(width=120, highlight=False)
