@@ -15,7 +15,7 @@ from support import oracle
 from support.ball import BallScenario
 from support.episodes import HARDER
 from usm_baselines.laws.super_twisting import SuperTwistingGains
-from usm_baselines.policy import ScriptedPolicy
+from usm_baselines.policy import Percept, ScriptedPolicy
 from usm_baselines.signals import Signals
 
 from tests.support.signals import made_signals
@@ -341,6 +341,31 @@ def test_stable_baselines_evaluates_every_policy(id: str) -> None:
     expected = [by_hand(policy, 5, 2), by_hand(policy, 6, 2)]
     np.testing.assert_allclose(returns, np.transpose(expected).ravel(), rtol=1e-6)
     assert len(set(returns)) == 4
+
+
+@pytest.mark.parametrize("id", ["sta-navigator", "lqg-joints", "mpc-limits", "adaptive"])
+def test_a_correction_is_as_if_the_law_believed_so_and_halves_are_the_whole(id: str) -> None:
+    policy: Any = usm_baselines.make(id, named("nominal", "operation", PRESETS["basin"]).nominal)
+    rng, state, place = np.random.default_rng(0), None, policy.predictor_columns
+    start, largest = np.ones(3, bool), 0.0
+    for now in observations(20, 3, conditions="basin"):
+        action, new = policy.predict(now, state, start)
+        known = policy.perceive(now, state, start)
+        correction = rng.normal(0.0, (1e-3, 1e-2, 0.1), (3, 2, 3))
+        corrected, _ = policy.decide(known, correction)
+        # Not for the worse of what is known.
+        halves, kept = policy.decide(known)
+        assert (halves.tobytes(), kept.tobytes()) == (action.tobytes(), new.tobytes())
+        believed = known.state.copy()
+        believed[:, place][:, :6] += correction.reshape(3, 6)
+        error, rate, disturbance = np.moveaxis(believed[:, place][:, :6].reshape(3, 2, 3), 2, 0)
+        signals = known.signals._replace(y=error, rate=rate, disturbance=disturbance)
+        assert policy.decide(Percept(signals, believed))[0].tobytes() == corrected.tobytes()
+        whole, _ = policy.predict(now, state, start, correction=correction)
+        assert whole.tobytes() == corrected.tobytes()
+        largest = max(largest, np.abs(corrected - action).max())
+        state, start = new, rng.random(3) < 0.2
+    assert largest > 1e-2
 
 
 @pytest.mark.parametrize("id", ["sta-navigator", "lqg-joints", "mpc", "adaptive"])

@@ -106,7 +106,7 @@ RESULTS = {
     "sensitivity": sensitivity,
     "fit under way": lambda: FitProgress(evaluations=(((0.5,), 3.0),), provenance=PROVENANCE),
     "fit": fit,
-    "study": lambda: study(["estimator-adaptive-basin"], 2, 4),
+    "study": lambda: study(["estimator-lqg-joints-basin"], 2, 4),
     "bench": lambda: SpeedResult.read(STORED / "bench.json"),
 }
 kinds = pytest.mark.parametrize("kind", RESULTS)

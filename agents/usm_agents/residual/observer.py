@@ -236,7 +236,7 @@ class ResidualObserver:
             The agent's observations, (batch, layout.size), and the frames for the next call.
         """
         size = len(base_action)
-        seen = np.empty((size, self.layout.size), np.float32)
+        seen = np.empty((size, self._table.scale.size), np.float32)
         kept = np.empty((size, self.earlier))
         show(
             self._table,

@@ -70,12 +70,15 @@ class Memory(NamedTuple):
 def correct_all(base_action, allocation, limit, residual, wrench, command):  # type: ignore[no-untyped-def]
     """Fill in the commands over the limit, (batch, thrusters): the base's and a residual's.
 
-    Residuals are wrenches (N, N, N m), which thruster forces of least norm make, or forces, N.
+    Residuals are wrenches (N, N, N m), without a moment if they have two numbers, which thruster
+    forces of least norm make, or these forces, N.
     """
     forces, work = np.empty(base_action.shape[1]), np.empty((7, 3))
+    wanted = np.zeros(3)
     for b in range(len(command)):
         if wrench:
-            allocate(allocation[b], residual[b], 3, work, forces)
+            wanted[: residual.shape[1]] = residual[b]
+            allocate(allocation[b], wanted, 3, work, forces)
         else:
             forces[:] = residual[b]
         for j in range(forces.size):
@@ -234,8 +237,6 @@ class Residual:
             return command, memory._replace(action=action, base_state=base_state)
         command = np.empty_like(memory.base_action)
         residual = self._scale * action.astype(np.float64)
-        if self._action == "force":  # a wrench without moment
-            residual = np.pad(residual, ((0, 0), (0, 3 - self.actions)))
         as_wrench = self._action != "thrusters"
         correct_all(
             memory.base_action, memory.allocation, memory.limit, residual, as_wrench, command

@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import sys
+from functools import partial
 from hashlib import sha256
 from itertools import pairwise
 
@@ -19,8 +20,9 @@ from usm_agents.artifact.folder import (
     read_agent,
     write_agent,
 )
-from usm_agents.artifact.network import Network
+from usm_agents.artifact.network import Network, Recurrence
 from usm_agents.residual.task import Residual, ResidualPolicy
+from usm_baselines import registry
 
 import usm_gym
 from usm_cli.program import main
@@ -30,7 +32,7 @@ SUITE = usm_gym.suite("operation")[:2]
 NOMINAL = SUITE[0].nominal
 
 
-def network(inputs, outputs=3):
+def network(inputs, outputs=2):
     rng = np.random.default_rng(0)
     sizes = (inputs, 8, outputs)
     weights = [rng.normal(0, 0.3, pair).astype(np.float32) for pair in pairwise(sizes)]
@@ -38,17 +40,16 @@ def network(inputs, outputs=3):
     return Network(tuple(weights), tuple(biases), "tanh", "clip")
 
 
-@pytest.fixture
-def folder(tmp_path):
-    residual = Residual(NOMINAL)
-    description = {
+def described(residual, base, **fields):
+    """Description of an agent of a task on a base with its own gains."""
+    return {
         "summary": "none that has learned anything",
         "mode": "operation",
         "conditions": {},
-        "base": "sta",
-        "gains": residual.base.gains._asdict(),
+        "base": base,
+        "gains": {},
         "residual_scale": 2.0,
-        "action": "wrench",
+        "action": "force",
         "omit": [],
         "frames": 1,
         "layout": residual.layout.fingerprint,
@@ -57,7 +58,14 @@ def folder(tmp_path):
         "steps": 1,
         "training": {},
         "scores": {},
+        **fields,
     }
+
+
+@pytest.fixture
+def folder(tmp_path):
+    residual = Residual(NOMINAL)
+    description = described(residual, "sta", gains=residual.base.gains._asdict())
     write_agent(tmp_path / "agent", description, network(residual.layout.size))
     return tmp_path / "agent"
 
@@ -75,15 +83,40 @@ def test_an_agent_read_back_is_the_agent_to_the_bit(folder):
         assert (read.per_episode[name] == values).all()
 
 
-def test_where_positions_are_measured_worse_an_agent_sees_errors_on_the_scale_of_that_place(folder):
-    conditions = dataclasses.replace(SUITE[0].conditions, position_noise=1e-3)
-    noisy = [dataclasses.replace(SUITE[0], conditions=conditions)]
-    residual = Residual(noisy[0].nominal, residual_scale=2.0)
-    assert residual.layout.fingerprint != Residual(NOMINAL).layout.fingerprint
-    ours = usm_gym.evaluate(ResidualPolicy(residual, network(residual.layout.size)), noisy)
-    read = usm_gym.evaluate(make_agent(noisy[0].nominal, str(folder)), noisy)
+def test_an_agent_sees_errors_on_the_scale_of_its_training_wherever_it_is_taken(folder):
+    (there,) = usm_gym.suite("operation-basin")[:1]
+    there = dataclasses.replace(there, duration=2.0, settle_time=0.5)
+    home = Residual(NOMINAL).layout
+    assert Residual(there.nominal).layout.fingerprint != home.fingerprint
+    residual = Residual(
+        there.nominal, residual_scale=2.0, position_noise=SUITE[0].conditions.position_noise
+    )
+    assert residual.layout.fingerprint == home.fingerprint
+    ours = usm_gym.evaluate(ResidualPolicy(residual, network(home.size)), [there])
+    read = usm_gym.evaluate(make_agent(there.nominal, str(folder)), [there])
     for name, values in ours.per_episode.items():
         assert (read.per_episode[name] == values).all()
+
+
+def test_an_agent_may_have_one_as_its_base_that_corrects_estimates(tmp_path, monkeypatch):
+    monkeypatch.setattr(registry, "_entries", dict(registry._entries))
+    below, rng = Residual(NOMINAL, "sta-navigator", action="estimates"), np.random.default_rng(0)
+    sizes = (below.layout.size, 16), (4, 16), 16
+    memory = Recurrence(*(rng.normal(0, 0.3, size).astype(np.float32) for size in sizes), period=4)
+    net = dataclasses.replace(network(4, below.actions), recurrence=memory)
+    description = described(below, "sta-navigator", action="estimates")
+    write_agent(tmp_path / "below", description, net)
+    registry.register("below", partial(make_agent, folder=str(tmp_path / "below")), "made up")
+    residual = Residual(NOMINAL, ResidualPolicy(below, net), residual_scale=2.0)
+    above = network(residual.layout.size)
+    write_agent(tmp_path / "above", described(residual, "below"), above)
+    scenarios = [dataclasses.replace(SUITE[0], duration=3.0, settle_time=0.5)]
+    ours = usm_gym.evaluate(ResidualPolicy(residual, above), scenarios)
+    read = usm_gym.evaluate(agent_contender(str(tmp_path / "above")).make(NOMINAL), scenarios)
+    for name, values in ours.per_episode.items():
+        assert (read.per_episode[name] == values).all()
+    _, found = read_agent(tmp_path / "below")
+    assert found.recurrence.period == 4
 
 
 def test_a_network_answers_alike_for_one_and_for_many():

@@ -22,7 +22,8 @@ from usm_gym.envs.vector_env import TrackingVectorEnv
 from usm_gym.support.validation import UsageError
 from usm_gym.task.metrics import objective
 
-PLAN = Plan(algorithm="regression", steps=4096, interval=1024)
+# A PD law leaves the disturbance to its agent.
+PLAN = Plan(algorithm="regression", base="pd-tuned", steps=4096, interval=1024)
 SMALL = {"validation_episodes": 2, "test_episodes": 2}
 RESULTS = ("plan.json", "curve.json", "agent.json", "policy.safetensors")
 
@@ -74,7 +75,7 @@ def test_the_command_scores_its_agent_as_its_training_did(tmp_path, capsys):
     assert scores["max_error_x"] == agent.scores["sampled"]["max_error_x"]
     assert agent.training["settings"] == SETTINGS
     # What it was told is of use: the disturbance that it cancels is that of the simulation.
-    assert objective(best_of(curve)) < 0.95 * objective(curve[0])
+    assert objective(best_of(curve)) < 0.7 * objective(curve[0])
 
 
 MINE = """

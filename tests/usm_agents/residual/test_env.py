@@ -41,7 +41,7 @@ def test_a_zero_residual_is_the_base_to_the_bit(base):
     for _ in range(600):
         action, state = policy.predict(observation, state)
         observation, reward, *_, info = plain.step(action)
-        _, its_reward, *_, its_info = residual.step(np.zeros(3, np.float32))
+        _, its_reward, *_, its_info = residual.step(np.zeros(2, np.float32))
         assert its_reward == reward
         assert its_info == info
 
@@ -61,7 +61,7 @@ def test_a_zero_residual_is_the_base_to_the_bit_in_a_vector():
     for _ in range(700):
         action, state = policy.predict(observation, state, done)
         observation, rewards, terminated, truncated, _ = plain.step(action)
-        _, its_rewards, its_terminated, *_ = residual.step(np.zeros((3, 3), np.float32))
+        _, its_rewards, its_terminated, *_ = residual.step(np.zeros((3, 2), np.float32))
         done = terminated | truncated
         ends += done.sum()
         assert (its_rewards == rewards).all()
@@ -77,7 +77,7 @@ def test_a_vector_behaves_as_single_environments(autoreset_mode):
     expected = [env.reset(seed=5 + i)[0] for i, env in enumerate(singles)]
     assert (seen == np.stack(expected)).all()
     waiting, ends = [False] * 3, 0
-    for actions in np.random.default_rng(0).uniform(-1, 1, (500, 3, 3)).astype(np.float32):
+    for actions in np.random.default_rng(0).uniform(-1, 1, (500, 3, 2)).astype(np.float32):
         seen, rewards, terminated, truncated, infos = envs.step(actions)
         for i, env in enumerate(singles):
             if waiting[i]:
@@ -99,7 +99,7 @@ def test_a_vector_behaves_as_single_environments(autoreset_mode):
 
 def test_resetting_some_robots_leaves_the_others_alone():
     envs, reference = (vector(3, autoreset_mode="Disabled") for _ in range(2))
-    actions = np.random.default_rng(0).uniform(-1, 1, (60, 3, 3)).astype(np.float32)
+    actions = np.random.default_rng(0).uniform(-1, 1, (60, 3, 2)).astype(np.float32)
     for each in (envs, reference):
         each.reset(seed=3)
     for action in actions[:30]:
@@ -113,7 +113,7 @@ def test_resetting_some_robots_leaves_the_others_alone():
         assert (ours[[0, 2]] == theirs[[0, 2]]).all()
 
 
-@pytest.mark.parametrize("action", ["wrench", "thrusters"])
+@pytest.mark.parametrize("action", ["force", "wrench", "thrusters"])
 def test_base_and_residual_are_saturated_once_and_the_base_is_told(action):
     """What was applied drives a plain environment, whose observations drive a base of its own."""
     residual, plain = gym.make(ID, action=action, residual_scale=6.0), gym.make("USM-Operation-v0")
@@ -127,8 +127,9 @@ def test_base_and_residual_are_saturated_once_and_the_base_is_told(action):
         base, state = policy.predict(observation, state)
         chosen = residual.action_space.sample()
         forces = 6.0 * chosen
-        if action == "wrench":
-            forces = np.linalg.pinv(laws.look(robot, observation).T) @ forces
+        if action != "thrusters":
+            wrench = np.pad(forces, (0, 3 - len(forces)))
+            forces = np.linalg.pinv(laws.look(robot, observation).T) @ wrench
         seen, *_ = residual.step(chosen)
         applied = seen[layout.slices["thruster_command"]]
         np.testing.assert_allclose(applied, np.clip(base + forces / 20.0, -1.0, 1.0), atol=2e-7)
@@ -144,7 +145,7 @@ def test_what_is_seen_means_what_the_table_says():
     assert residual.observation_space == layout.space
     plain, _ = env.reset(seed=0)
     seen, _ = residual.reset(seed=0)
-    action = np.array([0.1, -0.2, 0.3], np.float32)
+    action = np.array([0.1, -0.2], np.float32)
     part = layout.slices
     for _ in range(700):
         seen, *_ = residual.step(action)
@@ -184,7 +185,7 @@ def test_entries_are_left_out_and_earlier_frames_shown():
     assert (framed.reset(seed=0)[0] == np.concatenate(frames, axis=1)).all()
     ends = 0
     for _ in range(500):
-        action = random.uniform(-1, 1, (2, 3)).astype(np.float32)
+        action = random.uniform(-1, 1, (2, 2)).astype(np.float32)
         seen, shown = whole.step(action[0])[0], less.step(action[0])[0]
         for name, place in layout.slices.items():
             assert (shown[place] == seen[complete.slices[name]]).all()
@@ -208,7 +209,7 @@ def test_the_kalman_filter_knows_better_than_the_measurement():
     seen, _ = envs.reset(seed=0)
     measured, estimated = [], []
     for _ in range(500):
-        seen, *_, info = envs.step(np.zeros((16, 3), np.float32))
+        seen, *_, info = envs.step(np.zeros((16, 2), np.float32))
         truth = np.stack([info["error_x"], info["error_y"]], axis=1)
         for name, found in (("position_error", measured), ("estimated_error", estimated)):
             place = part[name]
@@ -222,7 +223,7 @@ def test_a_snapshot_holds_the_base_too():
     envs = vector(2, autoreset_mode="SameStep", conditions=HARD)
     env.reset(seed=1)
     envs.reset(seed=1)
-    actions = np.random.default_rng(0).uniform(-1, 1, (400, 2, 3)).astype(np.float32)
+    actions = np.random.default_rng(0).uniform(-1, 1, (400, 2, 2)).astype(np.float32)
     for each, of in ((env, lambda action: action[0]), (envs, lambda action: action)):
         for action in actions[:30]:
             each.step(of(action))
@@ -272,7 +273,7 @@ def test_robots_of_different_nominal_knowledge_are_refused_and_nothing_changes(s
     with pytest.raises(ValueError, match="one nominal knowledge"):
         envs.reset(options=options)
     assert plain.simulation.scenarios == before[0]
-    action = np.zeros((2, 3), np.float32)
+    action = np.zeros((2, 2), np.float32)
     seen = envs.step(action)[0]
     envs.restore(before[1])
     np.testing.assert_array_equal(envs.step(action)[0], seen)

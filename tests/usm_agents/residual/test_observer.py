@@ -30,8 +30,6 @@ def expected(residual, memory, observation, estimator_state, start, last):
     (signals, ahead), _ = Estimator(residual.nominal).update(observation, estimator_state, start)
     value = {name: (observation * layout.scale)[:, part] for name, part in layout.slices.items()}
     behind = np.arange(layout.links - 1, 0, -1) / layout.links
-    parts = signals.allocation * (memory.base_action * value["thruster_limit"])[:, None]
-    wrench = parts.sum(axis=2)
     numbers = {
         "position_error": value["position_error"],
         "position_age": value["position_age"],
@@ -44,10 +42,7 @@ def expected(residual, memory, observation, estimator_state, start, last):
         "estimated_thrust": signals.thrust,
         **{f"foreseen_error_{lead}": ahead[k, :, :, 0] for k, lead in enumerate(LEADS)},
         "foreseen_rate": ahead[-1, :, :, 1],
-        "base_force": wrench[:, :2],
-        "base_moment": wrench[:, 2:],
         "thruster_command": value["thruster_command"],
-        "last_action": np.where(start[:, None], 0.0, last),
         "heading": value["tail_angle"] - summed(behind * value["joint_angles"]),
         "heading_error": value["heading_error"],
         "heading_rate": value["tail_rate"] - summed(behind * value["joint_rates"]),
@@ -58,22 +53,40 @@ def expected(residual, memory, observation, estimator_state, start, last):
         "reference_deflection_acceleration": summed(value["joint_reference_accelerations"]),
         "bending_joints": summed((value["joint_references"] != 0.0).astype(float)),
     }
+    if residual.corrects:  # what the base believes; it has not acted yet
+        believed = memory.base_state[:, residual.base.predictor_columns]
+        for k, name in enumerate(("base_error", "base_rate", "base_disturbance")):
+            numbers[name] = believed[:, k:6:3]
+        return numbers
+    parts = signals.allocation * (memory.base_action * value["thruster_limit"])[:, None]
+    wrench = parts.sum(axis=2)
+    numbers |= {"base_force": wrench[:, :2], "base_moment": wrench[:, 2:]}
+    numbers["last_action"] = np.where(start[:, None], 0.0, last)
     for name in getattr(residual.base, "shown", ()):
         numbers[BASE_ENTRIES[name].name] = residual.base.state_of(memory.base_state)[name]
     return numbers
 
 
 @pytest.mark.parametrize("robot", [Robot(), SMALL, LONG], ids=["paper", "small", "long"])
-@pytest.mark.parametrize("base", ["sta", "lqg-joints", "zero"])
-def test_every_entry_of_the_table_is_filled_in(base, robot):
+@pytest.mark.parametrize(
+    ("base", "action"),
+    [
+        ("sta", "force"),
+        ("lqg-joints", "wrench"),
+        ("zero", "thrusters"),
+        ("lqg-joints", "estimates"),
+        ("sta-navigator", "estimates"),
+    ],
+)
+def test_every_entry_of_the_table_is_filled_in(base, action, robot):
     nominal = named("nominal", "operation", robot=robot).nominal
-    residual = Residual(nominal, base, omit=("heading",), frames=2)
+    residual = Residual(nominal, base, action=action, omit=("heading",), frames=2)
     layout = residual.layout
     plain = ObservationLayout(robot.links, len(robot.thrusters))
     rng = np.random.default_rng(0)
     half = layout.size // 2
     memory, start = None, np.ones(3, bool)
-    last, earlier = np.zeros((3, 3)), np.zeros((3, half), np.float32)
+    last, earlier = np.zeros((3, residual.actions)), np.zeros((3, half), np.float32)
     for _ in range(30):
         observation = rng.normal(0.0, 0.3, (3, plain.size)).astype(np.float32)
         # Joints that do not bend have references of 0.
@@ -82,13 +95,14 @@ def test_every_entry_of_the_table_is_filled_in(base, robot):
         filtered = None if memory is None else memory.estimator_state
         seen, memory = residual.observe(observation, memory, start)
         numbers = expected(residual, memory, observation, filtered, start, last)
+        assert {entry.name for entry in layout.frame} == {*numbers} - {"heading"}
         frame = np.concatenate([numbers[entry.name] for entry in layout.frame], axis=1)
         now = np.clip(frame / layout.scale[half:], -layout.bound[half:], layout.bound[half:])
         assert seen[:, half:] == pytest.approx(now, rel=1e-6, abs=1e-6)
         earlier = np.where(start[:, None], seen[:, half:], earlier)
         assert seen[:, :half].tobytes() == earlier.tobytes()
         earlier = seen[:, half:]
-        last = rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
+        last = rng.uniform(-1.0, 1.0, last.shape).astype(np.float32)
         _, memory = residual.command(memory, last)
         start = rng.random(3) < 0.2
 

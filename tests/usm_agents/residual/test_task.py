@@ -18,7 +18,7 @@ class Still:
     """An agent that corrects nothing."""
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
-        return np.zeros((len(observation), 3), np.float32), state
+        return np.zeros((len(observation), 2), np.float32), state
 
 
 def test_a_zero_residual_scores_as_the_base():
@@ -48,7 +48,7 @@ def test_a_model_of_the_task_is_scored_with_its_base():
             # The network's last bits depend on how many robots it acts for.
             np.testing.assert_allclose(scores.per_episode[f"max_error_{axis}"], expected, rtol=1e-3)
     with pytest.raises(
-        ValueError, match=r"is \(52,\); allowed: \(94,\); .* usm_agents.ResidualPolicy"
+        ValueError, match=r"is \(51,\); allowed: \(94,\); .* usm_agents.ResidualPolicy"
     ):
         usm_gym.evaluate(model, [scenario])
     with pytest.raises(ValueError, match="allowed: an environment of the residual task"):

@@ -11,7 +11,10 @@ from usm_agents.study.figures import draw_all
 from usm_gym import statistics
 from usm_gym.support.text import figures
 
-AGENTS = ["estimator-adaptive-basin", "estimator-sta-navigator-basin", "estimator-adaptive-sea"]
+AGENTS = [
+    *("estimator-lqg-joints-basin", "estimator-sta-navigator-basin"),
+    "estimator-sta-navigator-sea",
+]
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +31,8 @@ def test_every_policy_of_a_tier_is_in_its_tables(made):
         for policy in home.rows:
             assert sections[name].count(f"| {policy} ") >= 3  # scores, shifts, elsewhere
     assert "informed-basin (no competitor)" in sections["basin"]
-    ratio = made.homes["sea"].against["estimator-adaptive-sea"]["indi-sea"].ratios["max_error_x"]
-    table = sections["sea"].partition("#### estimator-adaptive-sea")[2]
+    ratio = made.homes["sea"].against["estimator-sta-navigator-sea"]["indi-sea"].ratios["max_error_x"]
+    table = sections["sea"].partition("#### estimator-sta-navigator-sea")[2]
     assert f"| indi-sea | {figures(ratio.value)} [" in table
     for row in (row for home in made.homes.values() for row in home.trained.values()):
         assert row.command in sections["Commands"]

@@ -24,7 +24,7 @@ def test_a_network_is_what_the_model_does(algorithm):
     random, network = np.random.default_rng(0), network_of(algorithm, model)
     their_state, our_state = None, None
     for start in (np.ones(100, bool), np.zeros(100, bool), random.random(100) < 0.5):
-        seen = random.normal(size=(100, 44)).astype(np.float32)
+        seen = random.normal(size=(100, network.inputs)).astype(np.float32)
         expected, their_state = model.predict(seen, their_state, start, deterministic=True)
         found, our_state = network.predict(seen, our_state, start)
         np.testing.assert_allclose(found, expected, atol=1e-6)

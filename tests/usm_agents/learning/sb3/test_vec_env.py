@@ -18,16 +18,15 @@ ID = "USM-Operation-v0"
 HARD = {"thruster_limit": 3.0, "current_limit": 0.3}
 
 
-def vec_env(count, **arguments):
-    return SB3VecEnv(
-        gym.make_vec(
-            ID,
-            num_envs=count,
-            vectorization_mode="vector_entry_point",
-            autoreset_mode="SameStep",
-            **arguments,
-        )
+def vec_env(count, reward=None, **arguments):
+    envs = gym.make_vec(
+        ID,
+        num_envs=count,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode="SameStep",
+        **arguments,
     )
+    return SB3VecEnv(envs, **(reward or {}))
 
 
 def test_it_behaves_as_sb3s_own_over_monitored_environments():
@@ -129,7 +128,7 @@ def test_the_residual_task_is_one_too():
     for _ in range(700):
         actions, state = policy.predict(observations, state, done)
         observations, rewards, done, infos = plain.step(actions)
-        seen, its_rewards, its_done, its_infos = scaled.step(np.zeros((3, 3), np.float32))
+        seen, its_rewards, its_done, its_infos = scaled.step(np.zeros((3, 2), np.float32))
         np.testing.assert_allclose(its_rewards, 0.1 * rewards, rtol=1e-6)
         assert (its_done == done).all()
         for index in np.flatnonzero(done):
@@ -137,6 +136,32 @@ def test_the_residual_task_is_one_too():
             assert its_infos[index]["episode"]["r"] == infos[index]["episode"]["r"]
             assert its_infos[index]["terminal_observation"].shape == seen[index].shape
     assert ends >= 3
+
+
+def test_what_commands_change_by_has_its_price():
+    plain = vec_env(3, conditions=HARD)
+    priced = vec_env(3, {"reward_scale": 0.5, "variation_price": 0.01}, conditions=HARD)
+    for each in (plain, priced):
+        each.seed(5)
+        each.reset()
+    limit, period = HARD["thruster_limit"], plain.get_attr("nominal")[0].control_period
+    before, ends, taken = np.zeros((3, 5)), 0, []
+    actions = np.random.default_rng(0).uniform(-2, 2, (500, 3, 5)).astype(np.float32)
+    for k, action in enumerate(actions):
+        if k == 150:
+            snapshot = priced.snapshot()
+        _, rewards, done, _ = plain.step(action)
+        taken.append(priced.step(action)[1])
+        command = limit * action.clip(-1.0, 1.0)
+        variation = np.abs(command - before).mean(axis=1) / period
+        expected = 0.5 * (rewards - np.where(done, 0.0, 0.01 * variation))
+        np.testing.assert_allclose(taken[-1], expected, rtol=1e-5)
+        before = np.where(done[:, None], 0.0, command)
+        ends += done.sum()
+    assert ends >= 3
+    priced.restore(snapshot)
+    replayed = [priced.step(action)[1] for action in actions[150:]]
+    assert (np.array(replayed) == np.array(taken[150:])).all()
 
 
 def test_other_environments_are_refused():
