@@ -50,6 +50,7 @@ AGENTS: dict[str, Plan] = {
     "estimator-sta-navigator-basin": replace(
         _ESTIMATOR, base="sta-navigator-basin", conditions=BASIN
     ),
+    "estimator-sta-navigator-sea": replace(_ESTIMATOR, base="sta-navigator-sea", conditions=SEA),
     "residual-sta-navigator-basin": replace(
         _RESIDUAL, base="estimator-sta-navigator-basin", conditions=BASIN
     ),

@@ -31,8 +31,9 @@ def test_every_policy_of_a_tier_is_in_its_tables(made):
         for policy in home.rows:
             assert sections[name].count(f"| {policy} ") >= 3  # scores, shifts, elsewhere
     assert "informed-basin (no competitor)" in sections["basin"]
-    ratio = made.homes["sea"].against["estimator-sta-navigator-sea"]["indi-sea"].ratios["max_error_x"]
-    table = sections["sea"].partition("#### estimator-sta-navigator-sea")[2]
+    agent = "estimator-sta-navigator-sea"
+    ratio = made.homes["sea"].against[agent]["indi-sea"].ratios["max_error_x"]
+    table = sections["sea"].partition(f"#### {agent}")[2]
     assert f"| indi-sea | {figures(ratio.value)} [" in table
     for row in (row for home in made.homes.values() for row in home.trained.values()):
         assert row.command in sections["Commands"]
