@@ -1,5 +1,7 @@
 """The network of an agent: with memory it is what torch makes of the same weights."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from usm_agents.artifact.network import Network, Recurrence
@@ -43,7 +45,7 @@ def test_a_memory_takes_in_one_observation_in_several_and_its_answer_stays(besid
     lengths = set()
     for b in range(4):
         begins = [*np.flatnonzero(starts[:, b]), 60]
-        for begin, end in zip(begins, begins[1:], strict=False):
+        for begin, end in pairwise(begins):
             episode = torch.from_numpy(seen[begin:end, b].copy())
             with torch.no_grad():
                 answers = memory(episode[::PERIOD])[0]
