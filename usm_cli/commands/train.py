@@ -46,13 +46,13 @@ OPTIONS = (
         "action",
         str,
         "KIND",
-        "what the agent adds to: the base's wrench or thrusters, or the "
-        "estimates that it acts on (default: wrench)",
+        "what the agent adds to: the base's force, wrench or thrusters, or the "
+        "estimates that it acts on (default: force)",
     ),
     ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of all random numbers (default: 0)"),
-    ("steps", int, "N", "steps of all robots together (default: 3000000)"),
-    ("interval", int, "N", "steps between checkpoints (default: 250000)"),
+    ("steps", int, "N", "steps of all robots together (default: 1000000)"),
+    ("interval", int, "N", "steps between checkpoints (default: 100000)"),
 )
 
 
