@@ -35,7 +35,7 @@ from usm_gym.support.validation import (
     require,
     validated,
 )
-from usm_gym.task.conditions import conditions_of
+from usm_gym.task.conditions import conditions_of, preset_of
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 
@@ -235,8 +235,14 @@ def agent_contender(folder: str) -> Contender:
     description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
     identity = json.dumps([agent.weights, description, sources])
     factory, told = partial(make_agent, folder=folder), told_with(agent.base)
-    note = note_of(agent.training)
-    return Contender(folder, factory, told=told, note=note, identity=identity)
+    return Contender(
+        folder,
+        factory,
+        told=told,
+        note=note_of(agent.training),
+        identity=identity,
+        tuned_for=trained_for(agent.conditions),
+    )
 
 
 def register_shipped() -> None:
@@ -245,8 +251,19 @@ def register_shipped() -> None:
         folder = description.parent
         agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
-        told, note = told_with(agent["base"]), note_of(agent["training"])
-        register(folder.name, factory, agent["summary"], told=told, note=note)
+        register(
+            folder.name,
+            factory,
+            agent["summary"],
+            told=told_with(agent["base"]),
+            note=note_of(agent["training"]),
+            tuned_for=trained_for(agent["conditions"]),
+        )
+
+
+def trained_for(conditions: Mapping[str, Any]) -> str:
+    """The preset of conditions that an agent was trained under; empty if under none."""
+    return preset_of(conditions_of(conditions))
 
 
 def note_of(training: Mapping[str, Any]) -> str:

@@ -8,12 +8,13 @@ import usm_agents  # noqa: F401 (registers them)
 import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
 from usm_baselines.registry import entry
+from usm_baselines.tiers import meant_for
 
 import usm_gym
 from usm_cli.program import main
 from usm_gym.suites import unseen
 from usm_gym.support.provenance import older_plant
-from usm_gym.task.conditions import Conditions
+from usm_gym.task.conditions import conditions_of
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
@@ -22,7 +23,9 @@ SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 def test_a_shipped_agent_beats_its_base_as_it_says(folder):
     assert folder.name in usm_baselines.ids()
     agent, _ = read_agent(folder)
-    scenarios = unseen(agent.mode, Conditions(**agent.conditions), seed=11, episodes=16)
+    conditions = conditions_of(agent.conditions)
+    assert folder.name in meant_for(conditions)
+    scenarios = unseen(agent.mode, conditions, seed=11, episodes=16)
     nominal = scenarios[0].nominal
     ours, base = (
         usm_gym.evaluate(usm_baselines.make(id, nominal, **gains), scenarios)
