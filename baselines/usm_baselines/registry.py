@@ -51,7 +51,7 @@ class Registration:
         on_request: Whether to leave it out of evaluations unless it is asked for.
         privileged: Whether it is given true state, and so is no competitor.
         note: What to bear in mind about its scores; empty if nothing.
-        tuned_for: The preset of conditions for which it was tuned or trained; empty if for none.
+        tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
     """
 
     factory: Callable[..., Policy]
@@ -93,16 +93,15 @@ def register(
             are not left out.
         privileged: Whether it is given true state.
         note: What to bear in mind about its scores.
-        tuned_for: The preset of conditions for which it was tuned or trained; empty if for none.
+        tuned_for: The preset of conditions that it was trained or tuned for.
 
     Raises:
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    _entries[id] = Registration(
-        factory, summary, chosen, told, on_request, privileged, note, tuned_for
-    )
+    about = (told, on_request, privileged, note, tuned_for)
+    _entries[id] = Registration(factory, summary, chosen, *about)
     for suffix, folder in FOLDERS.items():
         shipped = TUNED / folder / f"{id}.json"
         if shipped.is_file():

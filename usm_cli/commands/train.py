@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from usm_gym.task.conditions import PRESETS
 
 DESCRIPTION = """\
 Train an agent that adds residual thrust to a base policy, or corrects what the base believes. The
+command first prints what it trains, with which settings, and how often it validates. The progress
+bar shows the last validation: mean largest errors x / y, heading error, and thrust variation. The
 folder then holds the agent, which --policies takes, its learning curve on held-out scenarios of the
 training distribution, logs for TensorBoard, and the last checkpoint. Training never uses frozen
 suites. `usm train --resume --output DIR` continues from the last checkpoint and ends as if it had
@@ -25,7 +28,7 @@ examples:
   usm train --output mine                             PPO on the paper's controller
   usm train --algorithm tqc --base pd --output mine   another algorithm on another base
   usm train --algorithm estimator --action estimates --base lqg-joints-basin --conditions basin \\
-      --steps 2300000 --output believing              learn what to believe in a basin
+      --steps 4600000 --output believing              learn what to believe in a basin
   usm train --resume --output mine                    continue after an interruption
   usm evaluate --policies sta,mine                    score the agent
 """
@@ -46,8 +49,8 @@ OPTIONS = (
         "action",
         str,
         "KIND",
-        "what the agent adds to: the base's force, wrench or thrusters, or the "
-        "estimates that it acts on (default: force)",
+        "what the agent adds to: the base's force, wrench or thrusters, or "
+        "the estimates that it acts on (default: force)",
     ),
     ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of all random numbers (default: 0)"),
@@ -81,6 +84,7 @@ def add_to(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Train with a progress bar, and print the result."""
     folder = Path(arguments.output)
+    from usm_agents.learning.learner import settings_of
     from usm_agents.learning.plan import Plan, read_plan
     from usm_agents.learning.settings import SETTINGS
     from usm_agents.learning.training import train
@@ -102,6 +106,7 @@ def run(arguments: argparse.Namespace) -> None:
         plan = Plan(**given)
     if plan.algorithm in SETTINGS:
         check_installed("usm train", "agents", "sb3_contrib")
+    print_schedule(plan, settings_of(plan.algorithm))
     with progress_bar() as bar:
         line = bar.add_task("", total=plan.steps)
 
@@ -113,3 +118,17 @@ def run(arguments: argparse.Namespace) -> None:
     for name, point in (("before", curve[0]), ("best", best_of(curve)), ("last", curve[-1])):
         steps, seconds = point["steps"], point["seconds"]
         console.print(f"{name}: {in_words(point)} after {steps} steps, {seconds:.0f} s")
+
+
+def print_schedule(plan: Any, settings: Mapping[str, Any]) -> None:
+    """Say what will be trained, and how."""
+    on = f"{plan.algorithm} on the {plan.action} of {plan.base}"
+    if plan.action == "estimates":
+        on = f"{plan.algorithm} on what {plan.base} believes"
+    told = ", ".join(f"{name} {value}" for name, value in settings.items())
+    console = output_console()
+    for line in (
+        f"{on}: {plan.steps} steps, a validation every {plan.interval}",
+        f"settings: {told}",
+    ):
+        console.print(line, markup=False, highlight=False)

@@ -22,11 +22,11 @@ from safetensors.numpy import load, save
 from usm_baselines.contender import Contender, fingerprint
 from usm_baselines.gains import Gain
 from usm_baselines.registry import POSITION_ONLY, entry, make, register
+from usm_baselines.tiers import TIERS, tier_of
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
-from usm_gym.support.provenance import older_plant
 from usm_gym.support.validation import (
     Count,
     UsageError,
@@ -35,7 +35,7 @@ from usm_gym.support.validation import (
     require,
     validated,
 )
-from usm_gym.task.conditions import conditions_of, preset_of
+from usm_gym.task.conditions import conditions_of
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 
@@ -45,7 +45,7 @@ RECURRENCE = "recurrence_"  # begins the names of its arrays
 LARGEST_WEIGHTS = 256 * 2**20  # bytes
 PRETRAINED = Path(__file__).with_name("pretrained")
 # What agents are told besides what their base is, by their estimator and their observation.
-TOLD = ("lag", "noise", "straight body", "joint references")
+TOLD = ("lag", "noise", "delays", "nominal plant", "joint references")
 
 
 @validated
@@ -235,14 +235,7 @@ def agent_contender(folder: str) -> Contender:
     description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
     identity = json.dumps([agent.weights, description, sources])
     factory, told = partial(make_agent, folder=folder), told_with(agent.base)
-    return Contender(
-        folder,
-        factory,
-        told=told,
-        note=note_of(agent.training),
-        identity=identity,
-        tuned_for=trained_for(agent.conditions),
-    )
+    return Contender(folder, factory, told=told, identity=identity)
 
 
 def register_shipped() -> None:
@@ -251,24 +244,7 @@ def register_shipped() -> None:
         folder = description.parent
         agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
-        register(
-            folder.name,
-            factory,
-            agent["summary"],
-            told=told_with(agent["base"]),
-            note=note_of(agent["training"]),
-            tuned_for=trained_for(agent["conditions"]),
-        )
-
-
-def trained_for(conditions: Mapping[str, Any]) -> str:
-    """The preset of conditions that an agent was trained under; empty if under none."""
-    return preset_of(conditions_of(conditions))
-
-
-def note_of(training: Mapping[str, Any]) -> str:
-    """What to bear in mind about an agent of such a training."""
-    said = training.get("provenance")
-    version = said.get("version") if isinstance(said, Mapping) else None
-    known = isinstance(version, str) and older_plant(version)
-    return f"trained on the plant of {version}" if known else ""
+        told = told_with(agent["base"])
+        tier = tier_of(conditions_of(agent["conditions"]))
+        summary, tuned_for = agent["summary"], tier if tier in TIERS else ""
+        register(folder.name, factory, summary, told=told, tuned_for=tuned_for)

@@ -32,7 +32,7 @@ def describe(
     recorded, best = plan.record(), best_of(curve)
     gains = getattr(residual.base, "gains", None)
     return {
-        "summary": f"{plan.algorithm.rpartition(':')[2].upper()} residual on {plan.base}",
+        "summary": summary_of(plan),
         "mode": plan.mode,
         "conditions": recorded["conditions"],
         "base": plan.base.partition("@")[0],
@@ -51,3 +51,11 @@ def describe(
         },
         "scores": {"validation": best, **tested},
     }
+
+
+def summary_of(plan: Plan) -> str:
+    """What is trained, in a line."""
+    algorithm = plan.algorithm.rpartition(":")[2]
+    if plan.action == "estimates":
+        return f"{plan.base} on estimates that are corrected by learning ({algorithm})"
+    return f"{algorithm.upper()} residual on {plan.base}"

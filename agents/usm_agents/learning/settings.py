@@ -49,11 +49,13 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "estimator": {
         "robots": 128,
+        "horizon": 5,  # control periods over which the disturbance is meant
         "kept": 12,  # rounds that are fitted
-        "epochs": 6,
+        # More, when there are few rounds yet, would fit what the corrected law no longer meets.
+        "epochs": 8,
         "batch": 32,  # robots
         "memory_period": 5,  # control periods from one observation that the memory takes in on
-        "window": 150,  # of these observations, through which gradients go
+        "window": 100,  # of these observations, through which gradients go
         "learning_rate": 2e-3,  # at the start; falls linearly to a tenth over the training
         "weight_decay": 0.1,
         "units": 96,  # LSTM units

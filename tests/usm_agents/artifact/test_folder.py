@@ -6,14 +6,12 @@ import json
 import os
 import pickle
 import sys
-from dataclasses import asdict
 from functools import partial
 from hashlib import sha256
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from support.episodes import NOISY
 from usm_agents.artifact.folder import (
     DESCRIPTION,
     WEIGHTS,
@@ -29,7 +27,6 @@ from usm_baselines import registry
 import usm_gym
 from usm_cli.program import main
 from usm_gym.support.validation import SAID
-from usm_gym.task.conditions import PRESETS
 
 SUITE = usm_gym.suite("operation")[:2]
 NOMINAL = SUITE[0].nominal
@@ -120,12 +117,6 @@ def test_an_agent_may_have_one_as_its_base_that_corrects_estimates(tmp_path, mon
         assert (read.per_episode[name] == values).all()
     _, found = read_agent(tmp_path / "below")
     assert found.recurrence.period == 4
-
-
-def test_an_agent_is_for_the_conditions_of_its_training(folder):
-    for conditions, preset in ((asdict(PRESETS["basin"]), "basin"), ({}, "field"), (NOISY, "")):
-        change(folder, conditions=conditions)
-        assert agent_contender(str(folder)).tuned_for == preset
 
 
 def test_a_network_answers_alike_for_one_and_for_many():

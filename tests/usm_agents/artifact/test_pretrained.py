@@ -7,23 +7,19 @@ import pytest
 import usm_agents  # noqa: F401 (registers them)
 import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
-from usm_baselines.registry import entry
 from usm_baselines.tiers import meant_for
 
 import usm_gym
-from usm_cli.program import main
 from usm_gym.suites import unseen
-from usm_gym.support.provenance import older_plant
-from usm_gym.task.conditions import conditions_of
+from usm_gym.task.conditions import Conditions
 
 SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
 def test_a_shipped_agent_beats_its_base_as_it_says(folder):
-    assert folder.name in usm_baselines.ids()
     agent, _ = read_agent(folder)
-    conditions = conditions_of(agent.conditions)
+    conditions = Conditions(**agent.conditions)
     assert folder.name in meant_for(conditions)
     scenarios = unseen(agent.mode, conditions, seed=11, episodes=16)
     nominal = scenarios[0].nominal
@@ -33,25 +29,9 @@ def test_a_shipped_agent_beats_its_base_as_it_says(folder):
     )
     assert not ours.failed.any()
     names = [f"max_error_{axis}" for axis in "xy"]
-    if entry(folder.name).note:  # it was chosen by these errors alone
-        sums = [sum(scores.per_episode[name].mean() for name in names) for scores in (ours, base)]
-        assert sums[0] < sums[1]
-    else:
-        assert ours.objective().mean() < base.objective().mean()
+    assert ours.objective().mean() < base.objective().mean()
     for name in names:
         assert ours.per_episode[name].mean() < 2.0 * agent.scores["validation"][name]
-
-
-def test_an_agent_of_an_older_plant_is_listed_as_one(capsys):
-    main(["policies"])
-    listed = " ".join(capsys.readouterr().out.split())
-    for folder in SHIPPED:
-        agent, _ = read_agent(folder)
-        version = agent.training["provenance"]["version"]
-        note = f"trained on the plant of {version}" if older_plant(version) else ""
-        assert entry(folder.name).note == note
-        assert f"{folder.name} {agent.summary}" + (f" ({note})" if note else "") in listed
-    assert entry("sta-tuned").note == ""
 
 
 @pytest.mark.slow

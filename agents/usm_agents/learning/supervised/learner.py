@@ -49,6 +49,14 @@ class Round(NamedTuple):
     valid: NDArray[np.float32]
 
 
+def mean_ahead(values: NDArray[np.float64], periods: int) -> NDArray[np.float64]:
+    """Mean of each value and those that follow it, so many in all or as many as there are."""
+    total = np.cumsum(np.concatenate([np.zeros_like(values[:1]), values]), axis=0)
+    first = np.arange(len(values))
+    last = np.minimum(first + periods, len(values))
+    return np.asarray((total[last] - total[first]) / (last - first)[:, None, None])
+
+
 class Corrector(nn.Module):
     """A layer with memory, beside it what is seen now, a hidden layer, and corrections.
 
@@ -81,9 +89,10 @@ class Corrector(nn.Module):
 class EstimatorLearner:
     """Learns to correct the estimates that a law acts on; a `Learner` for the action "estimates".
 
-    Settings: robots; rounds whose data are kept; epochs of a fit; robots of a batch; control
-    periods from one observation that the memory takes in to the next, and through how many of these
-    gradients go; learning rate; weight decay; units of the memory, width of the hidden layer.
+    Settings: robots; control periods over which the disturbance is meant; rounds whose data are
+    kept; epochs of a fit; robots of a batch; control periods from one observation that the memory
+    takes in to the next, and through how many of these gradients go; learning rate; weight decay;
+    units of the memory, width of the hidden layer.
     """
 
     def __init__(self, setup: TrainingSetup) -> None:
@@ -134,6 +143,7 @@ class EstimatorLearner:
         scale = residual.layout.scale[velocity]
         inputs = np.empty((periods, *seen.shape), np.float32)
         wanted = np.zeros((periods, robots, len(scale), len(residual.correction)))
+        missed = np.zeros((periods, robots, len(scale)))
         valid = np.zeros((periods, robots), np.float32)
         kept, start = None, np.ones(robots, bool)
         first_episode = np.ones(robots, bool)
@@ -143,7 +153,7 @@ class EstimatorLearner:
             observation = known.signals.observation
             rate = truth["velocity"] - scale * seen[:, velocity]
             if k > 0:
-                wanted[k - 1, :, :, 2] += labels.missed(observation, rate)
+                missed[k - 1] = labels.missed(observation, rate)
             inputs[k], wanted[k] = seen, labels.take(known.state, truth["error"], rate)
             action, kept = network.predict(seen, kept, start)
             seen, _, terminated, truncated, _ = envs.step(action)
@@ -151,6 +161,7 @@ class EstimatorLearner:
             first_episode &= ~start
             valid[k] = first_episode
         valid[-1] = 0.0  # how the disturbance of the last period goes on is not known
+        wanted[:, :, :, 2] += mean_ahead(missed, setup.settings["horizon"])
         wanted /= residual.correction
         return Round(inputs, wanted.reshape(periods, robots, -1).astype(np.float32), valid)
 
@@ -168,8 +179,8 @@ class EstimatorLearner:
             for parts in zip(*self._rounds, strict=True)
         )
         period = settings["memory_period"]
-        span = settings["window"] * period
-        instants, losses = len(seen) // period, []
+        span, instants = settings["window"] * period, len(seen) // period
+        losses: list[float] = []
         for _ in range(settings["epochs"]):
             order = torch.from_numpy(self._random.permutation(seen.shape[1]))
             for robots in order.split(settings["batch"]):
