@@ -46,7 +46,7 @@ class Contender:
         note: What to bear in mind about its scores.
         identity: What its scores depend on besides scenarios and nominal knowledge; None where that
             is not known, as for the code of others.
-        tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
+        tuned_for: The preset of conditions for which it was tuned or trained; empty if for none.
     """
 
     name: str

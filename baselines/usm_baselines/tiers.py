@@ -21,7 +21,7 @@ def tier_of(conditions: Conditions) -> str:
 def meant_for(conditions: Conditions) -> list[str]:
     """Names of the policies that are meant for some conditions.
 
-    For a tier they are those whose gains are tuned for it, the paper's two, and those that are
+    For a tier they are those that are tuned or trained for it, the paper's two, and those that are
     given true state and have no gains to tune; for all other conditions all but those that are
     tuned for a tier.
     """

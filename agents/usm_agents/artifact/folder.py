@@ -71,7 +71,7 @@ class Agent:
         steps: After how many steps, 0 to 1e12.
         training: Settings, versions and the command of the training.
         scores: Scores with their provenance.
-        memory_period: That of the recurrence, if there is one, in control periods.
+        memory_period: That of the recurrence, if there is one, 1 to 1000 control periods.
     """
 
     summary: str

@@ -297,7 +297,11 @@ class ResidualPolicy:
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
     ) -> tuple[Array, tuple[Memory, Any]]:
-        """Act on one observation or a batch; see `ScriptedPolicy.predict`."""
+        """Act on one observation or a batch; see `ScriptedPolicy.predict`.
+
+        Raises:
+            ValueError: If the agent answers with other actions than those of the task.
+        """
         plain = np.asarray(observation, np.float32)
         batch = np.atleast_2d(plain)
         memory, agent_state = state or (None, None)
@@ -306,7 +310,9 @@ class ResidualPolicy:
             start |= np.asarray(episode_start, bool)
         seen, memory = self.residual.observe(batch, memory, start)
         action, agent_state = self._agent.predict(seen, agent_state, start, deterministic)
-        command, memory = self.residual.command(memory, np.asarray(action, np.float32))
+        action, fitting = np.asarray(action, np.float32), (len(batch), self.residual.actions)
+        require(action.shape == fitting, "the agent's action", action.shape, f"shape {fitting}")
+        command, memory = self.residual.command(memory, action)
         return (command if plain.ndim == 2 else command[0]), (memory, agent_state)
 
 

@@ -146,7 +146,7 @@ class CompetitorScores(Scores):
         competitor: False if it is told more than a vehicle knows.
         told: What it is told besides the measured position and the reference; empty if unknown.
         note: What to bear in mind about its scores.
-        tuned_for: The preset of conditions for which its gains are tuned; None if for none.
+        tuned_for: The preset of conditions for which it was tuned or trained; None if for none.
     """
 
     competitor: Switch

@@ -7,6 +7,7 @@ import pytest
 import usm_agents  # noqa: F401 (registers them)
 import usm_baselines
 from usm_agents.artifact.folder import DESCRIPTION, PRETRAINED, read_agent
+from usm_baselines.tiers import meant_for
 
 import usm_gym
 from usm_gym.suites import unseen
@@ -17,9 +18,10 @@ SHIPPED = [file.parent for file in sorted(PRETRAINED.glob(f"*/{DESCRIPTION}"))]
 
 @pytest.mark.parametrize("folder", SHIPPED, ids=lambda folder: folder.name)
 def test_a_shipped_agent_beats_its_base_as_it_says(folder):
-    assert folder.name in usm_baselines.ids()
     agent, _ = read_agent(folder)
-    scenarios = unseen(agent.mode, Conditions(**agent.conditions), seed=11, episodes=16)
+    conditions = Conditions(**agent.conditions)
+    assert folder.name in meant_for(conditions)
+    scenarios = unseen(agent.mode, conditions, seed=11, episodes=16)
     nominal = scenarios[0].nominal
     ours, base = (
         usm_gym.evaluate(usm_baselines.make(id, nominal, **gains), scenarios)

@@ -1,11 +1,14 @@
 """Plans: what cannot be trained is refused, and nothing of it needs torch."""
 
+import re
 import subprocess
 import sys
 import textwrap
 
 import pytest
 from usm_agents.learning.plan import Plan
+
+from usm_cli.commands.train import OPTIONS
 
 
 @pytest.mark.parametrize(
@@ -22,6 +25,13 @@ from usm_agents.learning.plan import Plan
 def test_bad_plans_are_refused(fields, message):
     with pytest.raises(ValueError, match=message):
         Plan(**fields)
+
+
+def test_the_help_states_the_defaults_of_a_plan():
+    plan = Plan()
+    for name, kind, _, text in OPTIONS:
+        (stated,) = re.findall(r"\(default: (.*)\)", text)
+        assert kind(stated) == getattr(plan, name)
 
 
 def test_plans_and_training_need_no_torch():

@@ -17,8 +17,11 @@ ID = "usm_agents:USM-OperationResidual-v0"
 class Still:
     """An agent that corrects nothing."""
 
+    def __init__(self, actions=2):
+        self.actions = actions
+
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
-        return np.zeros((len(observation), 2), np.float32), state
+        return np.zeros((len(observation), self.actions), np.float32), state
 
 
 def test_a_zero_residual_scores_as_the_base():
@@ -28,6 +31,13 @@ def test_a_zero_residual_scores_as_the_base():
     base = usm_gym.evaluate(usm_baselines.make("sta", nominal), scenarios)
     for name, values in base.per_episode.items():
         assert (ours.per_episode[name] == values).all()
+
+
+def test_actions_of_another_task_are_refused():
+    nominal = usm_gym.suite("operation")[0].nominal
+    policy = ResidualPolicy(Residual(nominal, action="force"), Still(3))
+    with pytest.raises(ValueError, match=r"action is \(1, 3\); allowed: shape \(1, 2\)"):
+        policy.predict(np.zeros(94, np.float32))
 
 
 def test_a_model_of_the_task_is_scored_with_its_base():
