@@ -91,11 +91,11 @@ def new_dataset(
 
     namespace = _namespace(name)
     target = get_dataset_path(name)
-    require(not (target / "data").exists(), "dataset", name, f"a new one; {target} is there")
     # Minari looks into no folder whose name begins with a dot.
     flat = get_dataset_path(name.replace("/", "."))
     part = flat.with_name(f".{flat.name}.part")
     with holding(flat):
+        require(not (target / "data").exists(), "dataset", name, f"a new one; {target} is there")
         remove_folder(part)
         try:
             storage = MinariStorage.new(

@@ -195,13 +195,13 @@ def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array
     table = np.atleast_2d(np.asarray(values, np.float64))
     below = (table[:, :, None] <= np.asarray(thresholds, np.float64)).astype(np.float64)
     rng = np.random.default_rng(0)
-    often = [
+    counts = [
         rng.multinomial(size, np.full(size, 1 / size), RESAMPLES) for size in table.shape[::-1]
     ]
     drawn = np.concatenate(
         [
             np.einsum("re,ret->rt", episodes, np.tensordot(seeds, below, 1), optimize=True)
-            for episodes, seeds in zip(*(np.array_split(o, PARTS) for o in often), strict=True)
+            for episodes, seeds in zip(*(np.array_split(o, PARTS) for o in counts), strict=True)
         ]
     )
     limits = np.quantile(drawn / table.size, (0.025, 0.975), axis=0)

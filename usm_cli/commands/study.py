@@ -22,8 +22,8 @@ study.md and figures (extra `render`) into a folder, and the trainings into the 
 After an interruption, run it again to continue, even in the middle of a training. This runs the
 training's checkpoint, which is code, if its plan is the study's, so give --output only a folder of
 your own. A folder that holds another training, or parts of one without its plan, is refused. An
-agent whose base is another agent is trained on the shipped one, so ship that one first. Takes days
-on two cores. Needs the extra `agents`.
+agent whose base is another agent is trained on the shipped one, and left out as long as there is
+none. Takes a day on two cores. Needs the extra `agents`.
 """
 EXAMPLES = """\
 examples:
@@ -43,7 +43,11 @@ def add_to(subparsers: Any) -> None:
     )
     add = parser.add_argument
     add("subject", choices=["residual"], help="what to study")
-    add("--only", metavar="A,B", help="some agents and ablations, by name (default: all)")
+    add(
+        "--only",
+        metavar="A,B",
+        help="some agents and ablations, by name (default: all whose base is shipped)",
+    )
     add("--seeds", type=int, default=10, metavar="N", help="largest number of seeds (default: 10)")
     add("--steps", type=int, metavar="N", help="steps of a training (default: as planned)")
     add("--episodes", type=int, default=100, metavar="N", help="unseen scenarios (default: 100)")
@@ -66,7 +70,9 @@ def run(arguments: argparse.Namespace) -> None:
     for name, least in (("seeds", 1), ("episodes", 2), ("steps", 1)):
         value = getattr(arguments, name)
         require(value is None or value >= least, f"--{name}", value, f"{least} or more")
-    names = list(plans.PLANS) if arguments.only is None else arguments.only.split(",")
+    names = list(filter(trainings.has_base, plans.PLANS))
+    if arguments.only is not None:
+        names = arguments.only.split(",")
     folder = output_folder(arguments.output)
     with holding(folder):
         chosen = trainings.planned(names, arguments.seeds, folder, arguments.steps)

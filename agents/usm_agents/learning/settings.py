@@ -49,7 +49,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "tqc": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "estimator": {
         "robots": 128,
-        "horizon": 5,  # control periods over which the disturbance is meant
+        "horizon": 5,  # control periods over which the label of the disturbance is averaged
         "kept": 12,  # rounds that are fitted
         # More, when there are few rounds yet, would fit what the corrected law no longer meets.
         "epochs": 8,

@@ -33,7 +33,8 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
     `Box(-1, 1)` in units of `residual_scale`. "force": force in x and y (N, global frame) on the
     centre of mass, without a moment, shared out to the thrusters with least norm. "wrench": the
     same with a moment (N m). "thrusters": forces of the thrusters (N). "estimates": what is added
-    to error, rate and disturbance in each axis, in units of the largest corrections.
+    to error, rate and disturbance in each axis, in units of the largest corrections; the base then
+    acts after the agent, which is shown neither its force and moment nor its own last action.
 
     ## Observation
 
@@ -53,7 +54,8 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 
         Args:
             env: A plain environment of this package.
-            residual: Arguments of `Residual`: base, residual_scale, action, omit, frames.
+            residual: Arguments of `Residual`: base, residual_scale, action, omit, frames,
+                position_noise.
 
         Raises:
             ValueError: If the base is unknown or an argument not allowed.
@@ -61,8 +63,9 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
         gym.utils.RecordConstructorArgs.__init__(self, **residual)
         gym.Wrapper.__init__(self, env)
         self._plain: USMEnv = env.unwrapped  # type: ignore[assignment]
-        self._arguments = residual
-        self._residual = Residual(self._plain.nominal, **residual)
+        # The agent's scales stay what they are when a scenario brings another noise.
+        self._arguments = {"position_noise": self._plain.nominal.position_noise, **residual}
+        self._residual = Residual(self._plain.nominal, **self._arguments)
         self.observation_space = self._residual.layout.space
         self.action_space = self._residual.action_space
 
@@ -98,6 +101,7 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
         """Return to a snapshot."""
         plain, self._memory = snapshot
         self._plain.restore(plain)
+        self._residual = _made_for(self._plain.nominal, self._residual, self._arguments)
 
 
 # The class docstring is the specification; its table comes from the one that the code uses.
@@ -122,14 +126,15 @@ class ResidualVectorEnv(
         gym.utils.RecordConstructorArgs.__init__(self, **residual)
         gym.vector.VectorWrapper.__init__(self, env)
         self._plain = env
-        self._arguments = residual
-        self._residual = Residual(env.nominal, **residual)
+        self._arguments = {"position_noise": env.nominal.position_noise, **residual}
+        self._residual = Residual(env.nominal, **self._arguments)
         env.require_same_nominal()
         self.single_observation_space = self._residual.layout.space
         self.single_action_space = self._residual.action_space
         self.observation_space = batch_space(self.single_observation_space, env.num_envs)
         self.action_space = batch_space(self.single_action_space, env.num_envs)
         self._memory: Memory | None = None
+        self._done = np.zeros(self.num_envs, bool)
 
     @property
     def residual(self) -> Residual:
@@ -162,7 +167,7 @@ class ResidualVectorEnv(
             seen, memory = self._residual.observe(observation, self._memory, which)
             self._seen = _chosen(which, seen, self._seen)
             self._memory = _chosen(which, memory, self._memory)
-        self._done = np.zeros(self.num_envs, bool)
+        self._done = self._done & ~which
         return self._seen.copy(), info
 
     def snapshot(self) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""The residual task: a learned correction of the thrust that a base policy commands."""
+"""The residual task: a learned correction of what a base policy commands or believes."""
 
 from __future__ import annotations
 
@@ -123,22 +123,9 @@ class Residual:
         Raises:
             ValueError: If the base is unknown or an argument not allowed.
         """
-        kinds = get_args(ActionKind)
-        require(action in kinds, "action", action, " or ".join(kinds))
-        require(
-            isinstance(residual_scale, (int, float))
-            and LEAST_RESIDUAL <= residual_scale <= LARGEST_RESIDUAL,
-            "residual_scale",
-            residual_scale,
-            f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
-        )
-        require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
-        if isinstance(base, str):
-            named = contender(base)
-            require(not named.privileged, "base", base, "a policy that is not given true state")
-            base = named.make(nominal)
+        _check(residual_scale, action, frames)
         self.nominal = nominal
-        self.base = base
+        self.base = base = _made(base, nominal)
         self._scale, self._action = float(residual_scale), action
         plain = ObservationLayout(nominal.robot.links, len(nominal.robot.thrusters))
         self._limit = plain.slices["thruster_limit"].start
@@ -314,6 +301,29 @@ class ResidualPolicy:
         require(action.shape == fitting, "the agent's action", action.shape, f"shape {fitting}")
         command, memory = self.residual.command(memory, action)
         return (command if plain.ndim == 2 else command[0]), (memory, agent_state)
+
+
+def _check(residual_scale: float, action: str, frames: int) -> None:
+    """Refuse arguments of a residual task that are not allowed."""
+    kinds = get_args(ActionKind)
+    require(action in kinds, "action", action, " or ".join(kinds))
+    require(
+        isinstance(residual_scale, (int, float))
+        and LEAST_RESIDUAL <= residual_scale <= LARGEST_RESIDUAL,
+        "residual_scale",
+        residual_scale,
+        f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
+    )
+    require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
+
+
+def _made(base: str | Policy, nominal: Nominal) -> Policy:
+    """The base policy, if only its name is given."""
+    if not isinstance(base, str):
+        return base
+    named = contender(base)
+    require(not named.privileged, "base", base, "a policy that is not given true state")
+    return named.make(nominal)
 
 
 def _task(env: Any) -> Residual:

@@ -150,8 +150,13 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
 
 
 def dissected(home: Home, chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
-    """What the agents of a home that add to the thrust do to it, as their seed 0; see `dissect`."""
-    made = {}
+    """What the agents that add to the thrust in `field` do to it, as their seed 0; see `dissect`.
+
+    In the other tiers the oracle, behind lag, dead-bands and gains, does not tell what was needed.
+    """
+    made: dict[str, Dissection] = {}
+    if home.tier != "field":
+        return made
     for training in chosen:
         plan = training.plan
         if training.name in AGENTS and plan.seed == 0 and plan.action != "estimates":

@@ -79,8 +79,9 @@ _CHANGES: dict[str, dict[str, Any]] = {
     "no-joint-references": {"omit": JOINT_REFERENCES},
     "no-randomisation": {"conditions": _EXACT},
     "wrench": {"action": "wrench"},
-    "thrusters": {"action": "thrusters"},
     "scale-6": {"residual_scale": 6.0},
+    # To be held against scale-6.
+    "thrusters": {"action": "thrusters", "residual_scale": 6.0},
     "scale-40": {"residual_scale": 40.0},
 }
 ABLATIONS = {name: replace(AGENTS[ABLATED], **changes) for name, changes in _CHANGES.items()}

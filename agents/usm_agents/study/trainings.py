@@ -106,13 +106,19 @@ def planned(
     return listed
 
 
-def require_base(name: str) -> None:
-    """Refuse an agent whose base is an agent of the study that is not shipped.
+def has_base(name: str) -> bool:
+    """Whether the base of an agent is there: one that is an agent of the study has to be shipped.
 
     A base is a registered policy, so that what is trained on it is what users get.
     """
     base = PLANS[name].base
-    if base in AGENTS and base not in ids():
+    return base not in AGENTS or base in ids()
+
+
+def require_base(name: str) -> None:
+    """Refuse an agent whose base is not there."""
+    if not has_base(name):
+        base = PLANS[name].base
         raise UsageError(
             f"the base of {name} is {base}, which is not shipped: first "
             f"usm study residual --only {base} --ship {SHIPPED}"

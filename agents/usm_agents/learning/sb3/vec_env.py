@@ -106,14 +106,15 @@ class SB3VecEnv(VecEnv):
             }
         self._returns[done] = 0.0
         self._lengths[done] = 0
-        price = self._variation_price * self._variation(done)
-        rewards = self._reward_scale * (rewards - price)
+        if self._variation_price > 0.0:
+            rewards = rewards - self._variation_price * self._variation(done)
+        rewards = self._reward_scale * rewards
         return observations, rewards.astype(np.float32), done, robot_infos
 
     def _variation(self, done: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         """How fast the commands of each robot change, N/s; 0 in the step that ends an episode."""
         before, self._command = self._command, self._commanded()
-        period = self._plain.nominal.control_period
+        period = self._plain.simulation.scenarios[0].conditions.control_period  # that of all
         change = np.abs(self._command - before).mean(axis=1) / period
         return np.where(done, 0.0, change)
 

@@ -89,10 +89,10 @@ class Corrector(nn.Module):
 class EstimatorLearner:
     """Learns to correct the estimates that a law acts on; a `Learner` for the action "estimates".
 
-    Settings: robots; control periods over which the disturbance is meant; rounds whose data are
-    kept; epochs of a fit; robots of a batch; control periods from one observation that the memory
-    takes in to the next, and through how many of these gradients go; learning rate; weight decay;
-    units of the memory, width of the hidden layer.
+    Settings: robots; control periods over which the label of the disturbance is averaged; rounds
+    whose data are kept; epochs of a fit; robots of a batch; control periods from one observation
+    that the memory takes in to the next, and through how many of these gradients go; learning rate;
+    weight decay; units of the memory, width of the hidden layer.
     """
 
     def __init__(self, setup: TrainingSetup) -> None:
