@@ -14,9 +14,10 @@ import usm_gym
 RESULTS = Path(__file__).parents[1] / "results"
 LEADERBOARD = RESULTS / usm_gym.__version__ / "leaderboard.json"
 # LAPACK designs the gains of these, and its last bits differ between machines. Gains that are off
-# by 1e-8 of themselves move a score by 1e-7 of itself. Everything else is the same on any machine:
-# kernels and the networks of agents fix the order of their operations.
-DESIGNED = {"lqg-joints-tuned": 1e-6, "mpc": 1e-6}
+# by 1e-8 of themselves move a score by 1e-7 of itself, and by more where a network rounds what it
+# sees to single precision. Everything else is the same on any machine: kernels and the networks of
+# agents fix the order of their operations.
+DESIGNED = {"lqg-joints-tuned": 1e-6, "mpc": 1e-6, "estimator-lqg-joints": 1e-4}
 
 
 @pytest.mark.parametrize("suite", EPISODES)

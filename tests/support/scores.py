@@ -20,7 +20,16 @@ import usm_gym
 FILE = Path(__file__).parents[1] / "data" / "scores.json"
 # By suite, the episode of it.
 EPISODES = {"operation": 0, "operation-basin": 1, "torpedo": 2}
-POLICIES = ("sta", "pd", "pid", "gsta-tuned", "lqg-joints-tuned", "mpc", "residual-ppo")
+POLICIES = (
+    "sta",
+    "pd",
+    "pid",
+    "gsta-tuned",
+    "lqg-joints-tuned",
+    "mpc",
+    "residual-ppo",
+    "estimator-lqg-joints",
+)
 
 
 def scores(policy: str, suite: str) -> dict[str, float]:
