@@ -23,7 +23,7 @@ After an interruption, run it again to continue, even in the middle of a trainin
 training's checkpoint, which is code, if its plan is the study's, so give --output only a folder of
 your own. A folder that holds another training, or parts of one without its plan, is refused. An
 agent whose base is another agent is trained on the shipped one, and left out as long as there is
-none. Takes a day on two cores. Needs the extra `agents`.
+none. Takes hours on two cores. Needs the extra `agents`.
 """
 EXAMPLES = """\
 examples:

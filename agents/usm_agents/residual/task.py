@@ -70,8 +70,8 @@ class Memory(NamedTuple):
 def correct_all(base_action, allocation, limit, residual, wrench, command):  # type: ignore[no-untyped-def]
     """Fill in the commands over the limit, (batch, thrusters): the base's and a residual's.
 
-    Residuals are wrenches (N, N, N m), without a moment if they have two numbers, which thruster
-    forces of least norm make, or these forces, N.
+    Residuals are wrenches (N, N, N m), which the thrusters make with least norm, or forces of the
+    thrusters, N. A wrench of two numbers has no moment.
     """
     forces, work = np.empty(base_action.shape[1]), np.empty((7, 3))
     wanted = np.zeros(3)
