@@ -104,19 +104,24 @@ class SB3VecEnv(VecEnv):
                     "t": round(time.time() - self._began, 6),
                 },
             }
+        if self._variation_price > 0.0:
+            free = done | (self._lengths == 1)
+            rewards = rewards - self._variation_price * self._variation(free)
         self._returns[done] = 0.0
         self._lengths[done] = 0
-        if self._variation_price > 0.0:
-            rewards = rewards - self._variation_price * self._variation(done)
         rewards = self._reward_scale * rewards
         return observations, rewards.astype(np.float32), done, robot_infos
 
-    def _variation(self, done: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        """How fast the commands of each robot change, N/s; 0 in the step that ends an episode."""
+    def _variation(self, free: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """How fast the commands of each robot change, N/s; 0 where that is free.
+
+        It is free in the first step of an episode, in which every law begins to push, and in the
+        last one, after which the command in effect is the next episode's.
+        """
         before, self._command = self._command, self._commanded()
         period = self._plain.simulation.scenarios[0].conditions.control_period  # that of all
         change = np.abs(self._command - before).mean(axis=1) / period
-        return np.where(done, 0.0, change)
+        return np.where(free, 0.0, change)
 
     def _commanded(self) -> np.ndarray[Any, Any]:
         """The commands in effect, N, (robots, thrusters)."""

@@ -49,12 +49,27 @@ class Round(NamedTuple):
     valid: NDArray[np.float32]
 
 
-def mean_ahead(values: NDArray[np.float64], periods: int) -> NDArray[np.float64]:
-    """Mean of each value and those that follow it, so many in all or as many as there are."""
-    total = np.cumsum(np.concatenate([np.zeros_like(values[:1]), values]), axis=0)
+def mean_ahead(
+    values: NDArray[np.float64], valid: NDArray[np.float32], periods: int
+) -> NDArray[np.float64]:
+    """Mean of each value and those that follow it, so many in all, of which the valid ones count.
+
+    Args:
+        values: By period and robot, (periods, robots, axes).
+        valid: Which of them count, 0 or 1, (periods, robots).
+        periods: How many are averaged, less at the end.
+
+    Returns:
+        Means, (periods, robots, axes); 0 where none counts.
+    """
+    counted = valid[:, :, None].astype(np.float64)
     first = np.arange(len(values))
     last = np.minimum(first + periods, len(values))
-    return np.asarray((total[last] - total[first]) / (last - first)[:, None, None])
+    sums = []
+    for part in (values * counted, counted):
+        total = np.cumsum(np.concatenate([np.zeros_like(part[:1]), part]), axis=0)
+        sums.append(total[last] - total[first])
+    return np.asarray(sums[0] / np.maximum(sums[1], 1.0))
 
 
 class Corrector(nn.Module):
@@ -161,7 +176,7 @@ class EstimatorLearner:
             first_episode &= ~start
             valid[k] = first_episode
         valid[-1] = 0.0  # how the disturbance of the last period goes on is not known
-        wanted[:, :, :, 2] += mean_ahead(missed, setup.settings["horizon"])
+        wanted[:, :, :, 2] += mean_ahead(missed, valid, setup.settings["horizon"])
         wanted /= residual.correction
         return Round(inputs, wanted.reshape(periods, robots, -1).astype(np.float32), valid)
 

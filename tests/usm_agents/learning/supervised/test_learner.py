@@ -11,7 +11,7 @@ from usm_agents.learning import training
 from usm_agents.learning.checkpoint import latest_checkpoint
 from usm_agents.learning.plan import Plan
 from usm_agents.learning.settings import SETTINGS
-from usm_agents.learning.supervised.learner import EstimatorLearner
+from usm_agents.learning.supervised.learner import EstimatorLearner, mean_ahead
 
 from usm_gym.evaluation import rollout
 from usm_gym.task.conditions import PRESETS
@@ -72,6 +72,15 @@ def test_a_training_that_is_stopped_goes_on_bit_for_bit(tmp_path):
     corrected = rollout(make_agent(scenarios[0].nominal, str(tmp_path / "whole")), scenarios)[0]
     base = rollout(usm_baselines.make("lqg-joints", scenarios[0].nominal), scenarios)[0]
     assert np.abs(corrected.error - base.error).max() < 0.05
+
+
+def test_the_mean_of_a_label_is_of_periods_that_count():
+    values = np.array([1.0, 2.0, 4.0, 8.0, 16.0])[:, None, None].repeat(2, axis=2)
+    valid = np.array([[1.0], [1.0], [0.0], [1.0], [0.0]], np.float32)
+    values[valid[:, 0] == 0.0] = 1e6  # of another episode
+    means = mean_ahead(values, valid, 2)
+    assert means[:, 0, 0].tolist() == [1.5, 2.0, 8.0, 8.0, 0.0]
+    assert (means[:, :, 0] == means[:, :, 1]).all()
 
 
 def test_it_learns_what_is_wanted(tmp_path):
