@@ -16,6 +16,7 @@ from usm_baselines.laws.generalised_super_twisting import (
     AdaptiveGeneralisedSuperTwisting,
     GeneralisedSuperTwisting,
 )
+from usm_baselines.laws.heading import Heading
 from usm_baselines.laws.incremental import Incremental
 from usm_baselines.laws.informed_lqg import InformedLQG
 from usm_baselines.laws.joint_lqg import JointLQG
@@ -328,3 +329,10 @@ register(
     privileged=True,
 )
 register("zero", Zero, "no thrust")
+register(
+    "heading",
+    Heading,
+    "the heading controller that all laws share, and no force",
+    space={},
+    on_request=True,
+)

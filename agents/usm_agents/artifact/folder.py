@@ -72,6 +72,7 @@ class Agent:
         training: Settings, versions and the command of the training.
         scores: Scores with their provenance.
         memory_period: That of the recurrence, if there is one, 1 to 1000 control periods.
+        base_weights: The `weights` of a base that is an agent itself, else empty.
     """
 
     summary: str
@@ -93,6 +94,7 @@ class Agent:
     training: dict[str, Any]
     scores: dict[str, Any]
     memory_period: Annotated[Count, Field(le=1000)] = 1
+    base_weights: str = ""
 
 
 _ADAPTER = TypeAdapter(Agent)
@@ -187,10 +189,13 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     """Make the policy of an agent's folder.
 
     Raises:
-        ValueError: If it cannot be read, or its observation is no longer laid out as in training.
+        ValueError: If it cannot be read, or its observation is no longer laid out as in training,
+            or its base is an agent that has been trained anew since.
         OSError: If it cannot be read.
     """
     agent, network = read_agent(Path(folder))
+    weights = weights_of(agent.base)
+    require(agent.base_weights == weights, f"base_weights of {folder}", agent.base_weights, weights)
     base = make(agent.base, nominal, **agent.gains)
     residual = Residual(
         nominal,
@@ -214,6 +219,12 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     return ResidualPolicy(residual, network)
 
 
+def weights_of(id: str) -> str:
+    """The SHA-256 of the weights of a shipped agent; empty for the id of another policy."""
+    folder = PRETRAINED / id
+    return _description(folder).weights if folder.is_dir() else ""
+
+
 def told_with(base: str) -> str:
     """What an agent on a base policy is told besides the measured position and the reference.
 
@@ -221,6 +232,12 @@ def told_with(base: str) -> str:
     """
     known = entry(base).told.split(", ")
     return ", ".join(dict.fromkeys([*TOLD, *(each for each in known if each != POSITION_ONLY)]))
+
+
+def made_for(conditions: dict[str, Any]) -> str:
+    """The tier that these conditions of a training are, as `Contender.tuned_for` has it."""
+    tier = tier_of(conditions_of(conditions))
+    return tier if tier in TIERS else ""
 
 
 def agent_contender(folder: str) -> Contender:
@@ -235,7 +252,9 @@ def agent_contender(folder: str) -> Contender:
     description = (Path(folder) / DESCRIPTION).read_text(encoding="utf-8")
     identity = json.dumps([agent.weights, description, sources])
     factory, told = partial(make_agent, folder=folder), told_with(agent.base)
-    return Contender(folder, factory, told=told, identity=identity)
+    return Contender(
+        folder, factory, told=told, identity=identity, tuned_for=made_for(agent.conditions)
+    )
 
 
 def register_shipped() -> None:
@@ -245,6 +264,5 @@ def register_shipped() -> None:
         agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
         told = told_with(agent["base"])
-        tier = tier_of(conditions_of(agent["conditions"]))
-        summary, tuned_for = agent["summary"], tier if tier in TIERS else ""
-        register(folder.name, factory, summary, told=told, tuned_for=tuned_for)
+        tuned_for = made_for(agent["conditions"])
+        register(folder.name, factory, agent["summary"], told=told, tuned_for=tuned_for)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from usm_agents.artifact.folder import weights_of
 from usm_agents.learning.plan import Plan
 from usm_agents.learning.validation import Validation, best_of
 from usm_agents.residual.task import Residual
@@ -36,6 +37,7 @@ def describe(
         "mode": plan.mode,
         "conditions": recorded["conditions"],
         "base": plan.base.partition("@")[0],
+        "base_weights": weights_of(plan.base),
         "gains": gains._asdict() if gains else {},
         **plan.task,
         "layout": residual.layout.fingerprint,

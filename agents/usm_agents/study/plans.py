@@ -40,8 +40,7 @@ _ESTIMATOR = Plan(algorithm="estimator", action="estimates", steps=4_600_000, in
 AGENTS: dict[str, Plan] = {
     "residual-ppo": _RESIDUAL,
     "residual-torpedo": replace(_RESIDUAL, env="usm_agents:USM-TorpedoResidual-v0"),
-    # Without a base nobody holds the heading, if not the agent.
-    "rl-only": replace(_RESIDUAL, base="zero", action="wrench"),
+    "rl-only": replace(_RESIDUAL, base="heading"),
     "estimator-lqg-joints": replace(
         _ESTIMATOR, base="lqg-joints", steps=3_000_000, interval=250_000
     ),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from usm_agents.artifact.folder import (
     DESCRIPTION,
+    PRETRAINED,
     WEIGHTS,
     agent_contender,
     make_agent,
@@ -73,6 +74,19 @@ def folder(tmp_path):
 def change(folder, **fields):
     description = json.loads((folder / DESCRIPTION).read_text())
     (folder / DESCRIPTION).write_text(json.dumps({**description, **fields}))
+
+
+def test_an_agent_acts_on_the_base_that_it_was_trained_on_only(tmp_path):
+    base = "estimator-lqg-joints"
+    residual = Residual(NOMINAL, base)
+    weights = read_agent(PRETRAINED / base)[0].weights
+    for name, known in (("same", weights), ("other", weights[::-1]), ("none", "")):
+        description = described(residual, base, base_weights=known)
+        write_agent(tmp_path / name, description, network(residual.layout.size))
+    assert make_agent(NOMINAL, str(tmp_path / "same")).base.nominal == NOMINAL
+    for name in ("other", "none"):
+        with pytest.raises(ValueError, match="base_weights"):
+            make_agent(NOMINAL, str(tmp_path / name))
 
 
 def test_an_agent_read_back_is_the_agent_to_the_bit(folder):
