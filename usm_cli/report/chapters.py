@@ -233,7 +233,7 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     episodes = unseen(first.mode, PRESETS[first.tier], result.seed, result.episodes)
     tables = [pair for name, home in homes for pair in sets(name, home).items()]
     return Chapter(
-        title="Study of residual agents",
+        title="Study of learned agents",
         lead=f"Agents of {len(homes)} tiers with several seeds, and what their parts contribute.",
         motion=motion(rows),
         verdict=verdict(rows, len(episodes)),

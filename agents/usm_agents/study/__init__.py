@@ -1,1 +1,1 @@
-"""The study of residual agents: trainings, their scores, what follows, tables and figures."""
+"""The study of learned agents: trainings, their scores, what follows, tables and figures."""

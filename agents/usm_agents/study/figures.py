@@ -1,4 +1,4 @@
-"""The study of residual agents as figures, which need the extra `render`."""
+"""The study of learned agents as figures, which need the extra `render`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The study of residual agents as Markdown, tier by tier."""
+"""The study of learned agents as Markdown, tier by tier."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ Each is `{ablated}` but for one thing. `thrusters` is to be held against `scale-
 
 def markdown(study: StudyResult) -> str:
     """All tables."""
-    parts = ["# Study of residual agents\n"]
+    parts = ["# Study of learned agents\n"]
     version = study.provenance.version
     if older_plant(version):
         parts += [EARLIER.format(version=version)]

@@ -85,13 +85,28 @@ _CHANGES: dict[str, dict[str, Any]] = {
 }
 ABLATIONS = {name: replace(AGENTS[ABLATED], **changes) for name, changes in _CHANGES.items()}
 PLANS = AGENTS | ABLATIONS
-# Most seeds of a training.
-SEEDS = dict.fromkeys(AGENTS, 10) | dict.fromkeys(ABLATIONS, 5)
+# The agents on which headlines rest, and most seeds of a training.
+HEADLINES = (
+    "residual-ppo",
+    "estimator-lqg-joints",
+    "estimator-lqg-joints-basin",
+    "residual-sta-navigator-basin",
+)
+SEEDS = dict.fromkeys(PLANS, 5) | dict.fromkeys(HEADLINES, 10)
 
 # Policies beside which the agents of a tier stand, as `--policies` takes them; besides them, the
 # agents' bases.
 RIVALS: dict[str, tuple[str, ...]] = {
-    "field": ("sta", "sta-tuned", "pd-tuned", "lqg-joints", "lqg-joints-tuned", "mpc-tuned"),
+    "field": (
+        "sta",
+        "sta-tuned",
+        "pd-tuned",
+        "lqg-joints",
+        "lqg-joints-tuned",
+        "mpc",
+        "adaptive",
+        "informed",
+    ),
     "basin": (
         "sta-navigator-basin",
         "indi-basin",

@@ -1,4 +1,4 @@
-"""The result of the study of residual agents."""
+"""The result of the study of learned agents."""
 
 from __future__ import annotations
 
@@ -254,7 +254,7 @@ class HomeResult:
 
 @validated
 class StudyResult(Result):
-    """The study of residual agents, as `usm study` writes it.
+    """The study of learned agents, as `usm study` writes it.
 
     Attributes:
         study: What is studied.

@@ -15,7 +15,7 @@ from usm_agents.study.claims import adaptation, against, over_seeds
 from usm_agents.study.dissection import dissected
 from usm_agents.study.plans import ABLATED, AGENTS, Home, home_of, rival_name, rivals_of
 from usm_agents.study.results import Claim, HomeResult, Scored, StudyResult, Trained
-from usm_agents.study.trainings import StudyTraining
+from usm_agents.study.trainings import StudyTraining, require_alike
 from usm_gym.evaluation import Evaluation
 from usm_gym.suites import unseen
 from usm_gym.support.results import Provenance
@@ -59,7 +59,12 @@ def rivals(chosen: Sequence[StudyTraining]) -> dict[Home, dict[str, Contender]]:
 def jobs(
     chosen: Sequence[StudyTraining], rivals: Rivals, episodes: int = TEST_EPISODES
 ) -> dict[Key, Job]:
-    """What is scored: all policies at home, agents and rivals also elsewhere."""
+    """What is scored: all policies at home, agents and rivals also elsewhere.
+
+    Raises:
+        ValueError: If the trainings of an agent differ in more than their seed.
+    """
+    require_alike(chosen)
     planned: dict[Key, Job] = {}
     for home, others in rivals.items():
         local = [training for training in chosen if home_of(training.name) == home]

@@ -150,6 +150,24 @@ def train_one(training: StudyTraining) -> None:
     train(training.plan, training.folder, lambda steps, line: None, resume=training.begun)
 
 
+def require_alike(chosen: Sequence[StudyTraining]) -> None:
+    """Refuse trainings of one name that differ in more than their seed.
+
+    Raises:
+        ValueError: If the settings, the base's gains or the base's weights are not the same.
+    """
+    known: dict[str, dict[str, object]] = {}
+    for training in chosen:
+        agent, _ = read_agent(training.folder)
+        trained = {
+            "settings": agent.training["settings"],
+            "gains": agent.gains,
+            "base_weights": agent.base_weights,
+        }
+        first = known.setdefault(training.name, trained)
+        require(trained == first, f"what {training.folder} was trained with", trained, f"{first}")
+
+
 def ship(chosen: Sequence[StudyTraining], folder: Path, command: str) -> None:
     """Put every agent, as its seed 0, under its own name into a folder.
 

@@ -5,6 +5,7 @@ import pickle
 import sys
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -164,6 +165,21 @@ def test_an_agent_on_another_agent_waits_until_that_one_is_shipped(tmp_path, mon
     assert not (tmp_path / "runs").exists()
     monkeypatch.setitem(registry._entries, base, registry.entry("sta-navigator-basin"))
     assert len(planned([name], 1, tmp_path)) == 1
+
+
+def test_seeds_that_were_trained_in_another_way_are_refused(tmp_path, monkeypatch):
+    chosen = trainings.planned(["residual-ppo", "scale-6"], 3, tmp_path)
+    made = {
+        each.folder: SimpleNamespace(training={"settings": {"gamma": 0.9}}, gains={}, base_weights="")
+        for each in chosen
+    }
+    monkeypatch.setattr(trainings, "read_agent", lambda folder: (made[folder], None))
+    trainings.require_alike(chosen)
+    last = chosen[-1].folder
+    for changed in ({"training": {"settings": {"gamma": 0.8}}}, {"base_weights": "other"}):
+        made[last] = SimpleNamespace(**{**vars(made[chosen[0].folder]), **changed})
+        with pytest.raises(ValueError, match="was trained with"):
+            trainings.require_alike(chosen)
 
 
 def test_an_ablation_is_the_ablated_agent_but_for_one_thing(tmp_path):
