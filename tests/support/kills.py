@@ -40,8 +40,15 @@ from usm_cli.program import main
 from usm_gym.suites import suite
 from usm_gym.task.scenario import STILL
 
-# Trainings, by the algorithm.
-TRAININGS = {"train": "sac", "regression": "regression"}
+# Options of trainings. A round of the estimator has 200 steps.
+TRAININGS = {
+    "train": ["--algorithm", "sac", "--steps", "8", "--interval", "8"],
+    "regression": ["--algorithm", "regression", "--steps", "8", "--interval", "8"],
+    "estimator": [
+        *("--algorithm", "estimator", "--action", "estimates", "--base", "lqg-joints"),
+        *("--steps", "400", "--interval", "200"),
+    ],
+}
 COMMANDS = {
     "tune": ["tune", "sta", "--trials", "20", "--episodes", "3", "--output", "sta.json"],
     "leaderboard": ["leaderboard", "--policies", "sta,pd", "--output", "mine"],
@@ -62,6 +69,7 @@ def shrink():
     """Make all commands small, in this process."""
     os.fsync = lambda handle: None  # a kill is no power cut
     SETTINGS["sac"] |= {"robots": 4, "learning_starts": 4, "batch_size": 8, "buffer_size": 100}
+    SETTINGS["estimator"] |= {"robots": 4, "units": 4, "hidden": 4, "batch": 2}
     training.train = partial(training.train, validation_episodes=2, test_episodes=2)
     trainings.train = training.train
     dissection.EPISODES = 2
@@ -85,8 +93,8 @@ def words(name):
     """The command as it is given, in the current folder, for the first time and again."""
     if name not in TRAININGS:
         return COMMANDS[name]
-    new = ["--algorithm", TRAININGS[name], "--steps", "8", "--interval", "8"]
-    return ["train", *(["--resume"] if Path("mine", PLAN).exists() else new), "--output", "mine"]
+    options = ["--resume"] if Path("mine", PLAN).exists() else TRAININGS[name]
+    return ["train", *options, "--output", "mine"]
 
 
 def begin(name, folder, die=None):
