@@ -14,7 +14,7 @@ REWARD_SCALE = 0.1
 VARIATION_PRICE = 1e-4
 
 _PPO: dict[str, Any] = {
-    "hidden": (64, 64),  # widths of the hidden layers
+    "hidden": (128, 128),  # widths of the hidden layers
     "n_steps": 16,
     "batch_size": 1024,
     "n_epochs": 4,
@@ -58,7 +58,8 @@ SETTINGS: dict[str, dict[str, Any]] = {
         "window": 100,  # of these observations, through which gradients go
         "learning_rate": 2e-3,  # at the start; falls linearly to a tenth over the training
         "weight_decay": 0.1,
-        "units": 96,  # LSTM units
+        "units": 64,  # LSTM units
+        "reach": 50,  # of these observations, for which units remember at first at most
         "hidden": 64,
     },
 }

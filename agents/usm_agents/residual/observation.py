@@ -74,7 +74,7 @@ class ResidualLayout(Layout):
         return (
             Entry("position_error", 2, "m", length, 10 * length, "as last measured (x, y)"),
             Entry("position_age", 1, "s", 0.1, 10.0, "how old that is"),
-            Entry("velocity_age", 1, "s", 0.1, 10.0, "how old the last velocity is; 0 if none"),
+            Entry("velocity_age", 1, "s", 0.1, 10.0, "how old the last velocity is; -1 if none"),
             Entry("reference_velocity", 2, "m/s", 0.1, 1.0, "velocity of the reference (x, y)"),
             Entry("reference_acceleration", 2, "m/s^2", 0.02, 0.2, "its acceleration"),
             Entry("estimated_error", 2, "m", length, 10 * length, "error, by the navigator"),

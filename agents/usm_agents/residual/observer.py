@@ -88,7 +88,7 @@ def tail_over_mean(seen, plain, entry, joints):
 def fill_axes(frame, starts, seen, plain, signals, ahead, b):
     """Fill in what is measured, estimated and foreseen, axis by axis."""
     frame[starts[ENTRY.position_age]] = value(seen, plain, PLAIN.position_age, 0)
-    frame[starts[ENTRY.velocity_age]] = max(value(seen, plain, PLAIN.velocity_age, 0), 0.0)
+    frame[starts[ENTRY.velocity_age]] = value(seen, plain, PLAIN.velocity_age, 0)
     for axis in range(signals.y.shape[1]):
         error = value(seen, plain, PLAIN.position_error, axis)
         frame[starts[ENTRY.position_error] + axis] = error

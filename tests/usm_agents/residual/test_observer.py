@@ -33,7 +33,7 @@ def expected(residual, memory, observation, estimator_state, start, last):
     numbers = {
         "position_error": value["position_error"],
         "position_age": value["position_age"],
-        "velocity_age": np.maximum(value["velocity_age"], 0.0),
+        "velocity_age": value["velocity_age"],
         "reference_velocity": signals.velocity,
         "reference_acceleration": signals.acceleration,
         "estimated_error": signals.y,

@@ -169,8 +169,9 @@ def test_an_agent_on_another_agent_waits_until_that_one_is_shipped(tmp_path, mon
 
 def test_seeds_that_were_trained_in_another_way_are_refused(tmp_path, monkeypatch):
     chosen = trainings.planned(["residual-ppo", "scale-6"], 3, tmp_path)
+    unchanged = {"gains": {}, "base_weights": ""}
     made = {
-        each.folder: SimpleNamespace(training={"settings": {"gamma": 0.9}}, gains={}, base_weights="")
+        each.folder: SimpleNamespace(training={"settings": {"gamma": 0.9}}, **unchanged)
         for each in chosen
     }
     monkeypatch.setattr(trainings, "read_agent", lambda folder: (made[folder], None))

@@ -79,10 +79,11 @@ class Corrector(nn.Module):
     to keep does not change fast: so it is fitted faster, over more time, and learns less by heart.
     """
 
-    def __init__(self, inputs: int, outputs: int, units: int, hidden: int) -> None:
-        """Make the layers."""
+    def __init__(self, inputs: int, outputs: int, units: int, hidden: int, reach: int) -> None:
+        """Make the layers; see `remember` for `reach`."""
         super().__init__()
         self.memory = nn.LSTM(inputs, units)
+        remember(self.memory, reach)
         self.hidden, self.last = nn.Linear(units + inputs, hidden), nn.Linear(hidden, outputs)
         nn.init.zeros_(self.last.weight)
         nn.init.zeros_(self.last.bias)
@@ -101,13 +102,28 @@ class Corrector(nn.Module):
         return self.last(torch.tanh(self.hidden(torch.cat([answers, seen], dim=2)))), kept
 
 
+def remember(memory: nn.LSTM, reach: int) -> None:
+    """Let the units of a memory keep what they take in for 1 to `reach` instants at first.
+
+    Source: C. Tallec, Y. Ollivier, Can recurrent neural networks warp time?, ICLR 2018.
+    """
+    units = memory.hidden_size
+    kept = torch.log(1.0 + (reach - 1.0) * torch.rand(units))
+    _, _, bias, other = memory.parameters()
+    with torch.no_grad():
+        bias.zero_()
+        other.zero_()
+        bias[:units], bias[units : 2 * units] = -kept, kept
+
+
 class EstimatorLearner:
     """Learns to correct the estimates that a law acts on; a `Learner` for the action "estimates".
 
     Settings: robots; control periods over which the label of the disturbance is averaged; rounds
     whose data are kept; epochs of a fit; robots of a batch; control periods from one observation
     that the memory takes in to the next, and through how many of these gradients go; learning rate;
-    weight decay; units of the memory, width of the hidden layer.
+    weight decay; units of the memory, for how many of the observations that it takes in they
+    remember at first, and the width of the hidden layer.
     """
 
     def __init__(self, setup: TrainingSetup) -> None:
@@ -123,6 +139,7 @@ class EstimatorLearner:
             self._residual.actions,
             settings["units"],
             settings["hidden"],
+            settings["reach"],
         )
         self._optimizer = torch.optim.AdamW(
             self._model.parameters(),
