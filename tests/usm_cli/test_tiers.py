@@ -44,6 +44,8 @@ def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys, monkeypatch):
     said = capsys.readouterr().out
     assert "median" in said
     assert "fifth" in said
+    again = chosen("--suite", "operation-basin", "--policies", "sta")
+    assert again["results"]["sta"] == data["results"]["sta"]
     brief = replace(suite("operation-basin")[0], duration=22.0)
     monkeypatch.setattr(selection, "suite", lambda name: [brief])
     assert list(chosen("--suite", "operation-basin")["results"]) == list(data["results"])
