@@ -16,6 +16,7 @@ from usm_agents.learning import training
 from usm_agents.learning.plan import Plan
 
 import usm_gym
+from usm_cli import selection
 from usm_cli.commands import leaderboard
 from usm_cli.program import main
 
@@ -76,6 +77,11 @@ def budgeted(line):
     return shlex.split(line, comments=True)[1:] + shlex.split(BUDGETS[name])
 
 
+def brief(scenario):
+    """The first two seconds of a scenario."""
+    return replace(scenario, duration=2.0, settle_time=0.5)
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder with the README, results, and the files that the pages tell a reader to save."""
@@ -89,12 +95,9 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     few = {name: scenarios[:2] for name, scenarios in leaderboard.suites().items()}
     monkeypatch.setattr(leaderboard, "suites", lambda: few)
-    sampled = Plan.scenario
-    monkeypatch.setattr(
-        Plan,
-        "scenario",
-        lambda plan, random: replace(sampled(plan, random), duration=2.0, settle_time=0.5),
-    )
+    sampled, unseen = Plan.scenario, selection.unseen
+    monkeypatch.setattr(Plan, "scenario", lambda *given: brief(sampled(*given)))
+    monkeypatch.setattr(selection, "unseen", lambda *given: [*map(brief, unseen(*given))])
     trained = partial(training.train, validation_episodes=2, test_episodes=2)
     monkeypatch.setattr(training, "train", trained)
     return tmp_path
