@@ -65,16 +65,18 @@ def against(ours: SeedScores, theirs: SeedScores) -> Claim:
     """What one policy is to another in the same episodes, each under its own seeds."""
     errors = [MAX_ERROR + axis for axis in ours.axes]
     metrics = [*errors, *(angle + ANGLE_ERROR for angle in ours.attitude), "thrust_variation"]
-    means = {metric: theirs.metrics[metric].mean for metric in metrics}
-    better = [np.array(ours.metrics[metric].seeds) < means[metric] for metric in errors]
+    tables = {metric: (ours.table(metric), theirs.table(metric)) for metric in metrics}
+    tables["objective"] = ours.objectives, theirs.objectives
+    better = [
+        np.array(ours.metrics[metric].seeds) < theirs.metrics[metric].mean for metric in errors
+    ]
     return Claim(
         ratios={
             metric: Estimated(
-                value=ours.metrics[metric].mean / mean,
-                ci95=ratio_interval(ours.table(metric), theirs.table(metric)),
+                value=float(mine.mean() / other.mean()), ci95=ratio_interval(mine, other)
             )
-            for metric, mean in means.items()
-            if mean > 0.0
+            for metric, (mine, other) in tables.items()
+            if other.mean() > 0.0
         },
         improvements={
             axis: Estimated(*crossed_improvement(ours.table(metric), theirs.table(metric)))

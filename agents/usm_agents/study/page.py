@@ -27,8 +27,9 @@ that is given true state is no competitor, and only shows what could be reached.
 """
 AGAINST = """\
 An agent over a rival in the same scenarios, with 95 % intervals as above: ratios of the means of
-the largest position errors, of thrust variation, and of the errors of the attitude, where less than
-1 is better; where an interval holds 1, the data do not decide. "Better in" is the probability that
+the largest position errors, of the errors of the attitude, of thrust variation, and of the
+objective that orders the board, where less than 1 is better; where an interval holds 1, the data do
+not decide. "Better in" is the probability that
 the agent has the smaller error in an episode; "better seeds" says how many have smaller means in
 {all} axes. A smaller error at a larger thrust variation or attitude error is no victory: the fair
 rival is the one that spends as much.

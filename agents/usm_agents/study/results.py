@@ -79,6 +79,11 @@ class SeedScores(Scores):
         """The largest errors, one per axis, m."""
         return [self.metrics[MAX_ERROR + axis] for axis in self.axes]
 
+    @property
+    def objectives(self) -> NDArray[np.float64]:
+        """What policies are ranked by, mm, (seeds, episodes): see `usm_gym.task.metrics`."""
+        return np.asarray(objective({name: self.table(name) for name in self.metrics}))
+
 
 @validated
 class Estimated:
@@ -98,8 +103,9 @@ class Claim:
     """What one policy is to another in the same episodes.
 
     Attributes:
-        ratios: Ratios of their means by metric: the largest errors of position and attitude, and
-            thrust variation; without those that the other one has none of.
+        ratios: Ratios of their means by metric: the largest errors of position and attitude,
+            thrust variation, and "objective", by which policies are ranked; without those that
+            the other one has none of.
         improvements: Probabilities that an episode's error is smaller, by axis.
         better_seeds: How many of its seeds are better than the other's mean in all axes.
     """

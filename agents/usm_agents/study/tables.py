@@ -143,7 +143,7 @@ def _ratios(claims: Mapping[str, Claim]) -> dict[str, str]:
     known = dict.fromkeys(metric for claim in claims.values() for metric in claim.ratios)
     words = {MAX_ERROR + axis: f"error {axis}" for axis in axes_of(known)}
     words |= {angle + ANGLE_ERROR: angle for angle in attitude_of(known)}
-    words["thrust_variation"] = "variation"
+    words |= {"thrust_variation": "variation", "objective": "objective"}
     return {metric: words[metric] for metric in known}
 
 

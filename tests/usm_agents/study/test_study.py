@@ -257,10 +257,13 @@ def test_scores_over_seeds_are_those_of_their_tables():
     rival = claims.over_seeds(parts[:1])
     claim = claims.against(found, rival)
     ours, theirs = found.table("max_error_x"), rival.table("max_error_x")
-    assert list(claim.ratios) == ["max_error_x", "heading_error", "thrust_variation"]
+    named = ["max_error_x", "heading_error", "thrust_variation", "objective"]
+    assert list(claim.ratios) == named
     ratio = claim.ratios["max_error_x"]
     assert ratio.value == pytest.approx(ours.mean() / theirs.mean())
     assert ratio.ci95 == ratio_interval(ours, theirs)
+    mine, other = (np.mean([part.objective() for part in of]) for of in (parts, parts[:1]))
+    assert claim.ratios["objective"].value == pytest.approx(mine / other)
     # Its seed 0 is the rival itself: ties count half.
     share = ((ours < theirs).mean() + (ours <= theirs).mean()) / 2
     assert claim.improvements["x"].value == pytest.approx(share)
