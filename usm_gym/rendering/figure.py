@@ -34,7 +34,7 @@ CURRENT = np.array([-0.04, -0.02])
 # Length of the arrow of a force, and how far beyond it the thruster's number is.
 FORCE, NUMBER = 42.0, 13.0
 # The detail: its frame, its joint, its scale in units per metre, and the angles of its two links.
-FRAME, JOINT, DETAIL = ((304.0, 246.0), (318.0, 206.0)), np.array([428.0, 338.0]), 940.0
+FRAME, JOINT, DETAIL = ((304.0, 246.0), (318.0, 206.0)), np.array([420.0, 330.0]), 830.0
 ANGLES = np.radians([62.0, 14.0])
 LINK, HEAD = link_shapes(72)
 
@@ -109,7 +109,9 @@ def _body(scene: Scene) -> str:
     robot, centres, angles = scene.robot, scene.at(scene.posture.centres), scene.posture.angles
     size = scene.scale * np.array([0.97 * robot.half_length, robot.half_width])
     marks = [stamp("link", LINK * size), stamp("head", HEAD * size)]
-    marks += [disc("edge", joint, 0.3 * size[1]) for joint in (centres[:-1] + centres[1:]) / 2]
+    for centre, angle in zip(centres[:-1], angles[:-1], strict=True):
+        joint = centre + scene.scale * robot.half_length * _axis(angle)
+        marks.append(disc("edge", joint, 0.3 * size[1]))
     for i, (centre, angle) in enumerate(zip(centres, angles, strict=True), 1):
         colours = ("head", "head-edge") if i == robot.links else ("body", "edge")
         marks.append(stamped("head" if i == robot.links else "link", *colours, centre, angle))
@@ -207,8 +209,8 @@ def _detail(robot: Robot) -> str:
     """Two links, larger and narrower, with their angles and that of the joint between them."""
     first = robot.links // 2 - 1
     angles = np.repeat(ANGLES, (first + 1, robot.links - first - 1))
-    centres = robot.link_centres(angles, np.zeros(2))[first : first + 2]
-    centres = JOINT + DETAIL * (centres - centres.mean(axis=0)) * (1, -1)
+    centres = DETAIL * robot.link_centres(angles, np.zeros(2))[first : first + 2] * (1, -1)
+    centres += JOINT - centres[0] - DETAIL * robot.half_length * _axis(ANGLES[0])
     size = DETAIL * np.array([0.97 * robot.half_length, 0.5 * robot.half_width])
     marks = [box("card", *FRAME, "rule"), stamp("large-link", LINK * size)]
     for centre, angle in zip(centres, ANGLES, strict=True):
@@ -216,24 +218,24 @@ def _detail(robot: Robot) -> str:
     marks.append(disc("edge", JOINT, 4))
     near, far = centres
     for start, angle, reach in (
-        (near, 0.0, 84),
-        (far, 0.0, 108),
-        (far, ANGLES[1], 108),
-        (JOINT, ANGLES[0], 98),
+        (near, 0.0, 78),
+        (far, 0.0, 96),
+        (JOINT, ANGLES[1], 152),
+        (JOINT, ANGLES[0], 82),
     ):
         marks.append(line("quiet", [start, start + reach * _axis(angle)], 1.2, "4 3"))
     along, across = _axis(ANGLES[0]), _axis(ANGLES[0] + np.pi / 2)
     named_marks = (
-        ("t", arrow("ink", near, near + 48 * along, 2.2), "*t*_i", near + 42 * along, (-34, -18)),
-        ("n", arrow("ink", near, near + 48 * across, 2.2), "*n*_i", near + 62 * across, (-2, 2)),
-        ("theta", turn("ink", near, 56, 0.0, ANGLES[0]), "*θ*_i", near, (68, -20)),
-        ("theta-next", turn("ink", far, 92, 0.0, ANGLES[1]), "*θ*_{*i*+1}", far, (120, -7)),
-        ("phi", turn("ink", JOINT, 58, *ANGLES), "*φ*_i", JOINT, (55, -60)),
+        ("t", arrow("ink", near, near + 44 * along, 2.2), "*t*_i", near + 42 * along, (-32, -14)),
+        ("n", arrow("ink", near, near + 44 * across, 2.2), "*n*_i", near + 58 * across, (-2, 2)),
+        ("theta", turn("ink", near, 52, 0.0, ANGLES[0]), "*θ*_i", near, (63, -18)),
+        ("theta-next", turn("ink", far, 84, 0.0, ANGLES[1]), "*θ*_{*i*+1}", far, (114, -6)),
+        ("phi", turn("ink", JOINT, 50, *ANGLES), "*φ*_i", JOINT, (46, -48)),
     )
     for name, mark, words, at, away in named_marks:
         marks.append(group(name, mark, text(words, at, away, anchor="middle", halo="card")))
-    marks.append(text("link *i*", near, (14, 58), "small", "quiet", halo="card"))
-    marks.append(text("link *i*+1", far, (6, 46), "small", "quiet", halo="card"))
+    marks.append(text("link *i*", near, (12, 50), "small", "quiet", halo="card"))
+    marks.append(text("link *i*+1", far, (8, 42), "small", "quiet", halo="card"))
     return group("detail", *marks)
 
 

@@ -26,7 +26,7 @@ ALARM = (176, 36, 24)
 
 
 def link_shapes(corners: int) -> tuple[Points, Points]:
-    """Supercircles: a link, and the head, over half length and half width, (corners, 2) each."""
+    """Superellipses: a link, and the head, over half length and half width, (corners, 2) each."""
     turn = np.linspace(0.0, 2 * np.pi, corners, endpoint=False)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     link = np.sign(circle) * np.abs(circle) ** (0.45, 0.6)

@@ -29,7 +29,6 @@ COLOURS = {
     "head": (look.HEAD, (178, 124, 22)),
     "head-edge": (look.HEAD_EDGE, (255, 226, 160)),
     "thrust": ((0, 96, 143), (108, 196, 245)),
-    "jet": (look.JET, (31, 85, 115)),
     "current": (look.CURRENT, (127, 182, 209)),
     "error": ((194, 84, 0), (255, 154, 77)),
     "reference": (look.REFERENCE, (226, 156, 196)),
@@ -70,12 +69,14 @@ def group(name: str, *marks: str) -> str:
     return "\n".join([f'<g id="{name}">', *marks, "</g>"])
 
 
-def line(name: str, points: ArrayLike, width: float = 1.5, dashes: str = "") -> str:
+def line(
+    name: str, points: ArrayLike, width: float = 1.5, dashes: str = "", cap: str = "round"
+) -> str:
     """A line through points, (k, 2)."""
     dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
     return (
         f'<path class="{name}-line" d="{_route(points)}" fill="none" '
-        f'stroke-width="{_number(width)}" stroke-linejoin="round" stroke-linecap="round"{dashed}/>'
+        f'stroke-width="{_number(width)}" stroke-linejoin="round" stroke-linecap="{cap}"{dashed}/>'
     )
 
 
@@ -113,12 +114,11 @@ def box(name: str, at: ArrayLike, size: ArrayLike, edge: str, dashes: str = "") 
 
 
 def arrow(name: str, start: ArrayLike, tip: ArrayLike, width: float = 2.4) -> str:
-    """A straight arrow; its path starts at `start` and ends at `tip`."""
+    """A straight arrow."""
     start, tip = np.asarray(start, float), np.asarray(tip, float)
     ahead = (tip - start) / np.linalg.norm(tip - start)
     neck = tip - 3.6 * width * ahead
-    shaft = line(name, [start, neck], width).replace('stroke-linecap="round"', "")
-    return shaft + _point(name, tip, ahead, width)
+    return line(name, [start, neck], width, cap="butt") + _point(name, tip, ahead, width)
 
 
 def turn(
@@ -129,8 +129,8 @@ def turn(
     angles = np.linspace(first, last - head, 24)
     arc = np.asarray(centre) + radius * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
     tip = np.asarray(centre) + radius * np.array([np.cos(last), -np.sin(last)])
-    shaft = line(name, arc, width).replace('stroke-linecap="round"', "")
-    return shaft + _point(name, tip, (tip - arc[-1]) / np.linalg.norm(tip - arc[-1]), width)
+    ahead = (tip - arc[-1]) / np.linalg.norm(tip - arc[-1])
+    return line(name, arc, width, cap="butt") + _point(name, tip, ahead, width)
 
 
 def text(
