@@ -33,8 +33,8 @@ ERROR = np.array([0.15, 0.15])
 CURRENT = np.array([-0.04, -0.02])
 # Length of the arrow of a force, and how far beyond it the thruster's number is.
 FORCE, NUMBER = 42.0, 13.0
-# The detail: its frame, its joint, its scale in units per metre, and the angles of its two links.
-FRAME, JOINT, DETAIL = ((304.0, 246.0), (318.0, 206.0)), np.array([420.0, 330.0]), 830.0
+# The detail: its frame, its joint, half the length of its two links, and their angles.
+FRAME, JOINT, DETAIL = ((304.0, 246.0), (318.0, 206.0)), np.array([420.0, 330.0]), 58.1
 ANGLES = np.radians([62.0, 14.0])
 LINK, HEAD = link_shapes(72)
 
@@ -78,8 +78,8 @@ def robot_drawing(robot: Robot) -> str:
         "anticlockwise from the x axis, and the joint angle is that of the link nearer to the "
         "tail less that of the other."
     )
-    marks = [_path(scene), _current(), _axes(), _thrusters(scene), _deflection(scene)]
-    marks += [_body(scene), _error(scene), _detail(robot), _words(robot)]
+    marks = [_path(scene), _current(), _axes(), _deflection(scene), _body(scene)]
+    marks += [_thrusters(scene), _error(scene), _detail(robot), _words(robot)]
     return document(SIZE, title, description, marks)
 
 
@@ -209,9 +209,10 @@ def _detail(robot: Robot) -> str:
     """Two links, larger and narrower, with their angles and that of the joint between them."""
     first = robot.links // 2 - 1
     angles = np.repeat(ANGLES, (first + 1, robot.links - first - 1))
-    centres = DETAIL * robot.link_centres(angles, np.zeros(2))[first : first + 2] * (1, -1)
-    centres += JOINT - centres[0] - DETAIL * robot.half_length * _axis(ANGLES[0])
-    size = DETAIL * np.array([0.97 * robot.half_length, 0.5 * robot.half_width])
+    scale = DETAIL / robot.half_length
+    centres = scale * robot.link_centres(angles, np.zeros(2))[first : first + 2] * (1, -1)
+    centres += JOINT - centres[0] - DETAIL * _axis(ANGLES[0])
+    size = scale * np.array([0.97 * robot.half_length, 0.5 * robot.half_width])
     marks = [box("card", *FRAME, "rule"), stamp("large-link", LINK * size)]
     for centre, angle in zip(centres, ANGLES, strict=True):
         marks.append(stamped("large-link", "body", "edge", centre, angle))
