@@ -1,6 +1,7 @@
 """The pages do what they say: every block of code runs, and the site builds."""
 
 import re
+import runpy
 import shlex
 import shutil
 import tomllib
@@ -133,6 +134,11 @@ def test_what_a_page_names_is_there(page):
     ]
     for names in re.findall(r"pip install .*\[(.+?)\]'", text):
         assert set(names.split(",")) <= set(extras), names
+
+
+def test_the_pictures_of_the_pages_are_what_their_command_draws():
+    for name, draw in runpy.run_path(str(ROOT / "docs" / "draw.py"))["DRAWINGS"].items():
+        assert (ROOT / "docs" / name).read_text(encoding="utf-8") == draw(), name
 
 
 def test_every_law_has_its_place_among_the_controllers():

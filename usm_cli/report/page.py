@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import jinja2
 
 from usm_cli.report.blocks import Chapter
+from usm_gym.rendering.figure import robot_drawing
+from usm_gym.robot import Robot
 
 ASSETS = files(__package__)
 STYLES = ("uplot/uPlot.min.css", "page/page.css")
@@ -42,6 +45,7 @@ def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
         motion=next((chapter.motion for chapter in chapters if chapter.motion), ""),
         verdict=next((chapter.verdict for chapter in chapters if chapter.verdict), ""),
         made=made,
+        robot=base64.b64encode(robot_drawing(Robot()).encode()).decode(),
         styles=_text(STYLES),
         scripts=_text(SCRIPTS),
     )

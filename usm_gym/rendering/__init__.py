@@ -1,1 +1,1 @@
-"""Pictures of the robot (need the extra `render`)."""
+"""Pictures of the robot; films and windows need the extra `render`."""

@@ -6,24 +6,37 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from usm_gym.rendering.panel import INK, LEFT, MIDDLE, PAPER, RIGHT, Colour, Panel, Points, write
-from usm_gym.rendering.picture import Picture, Posture
+from usm_gym.rendering.look import (
+    ALARM,
+    BODY,
+    BODY_EDGE,
+    CURRENT,
+    ERROR_COLOURS,
+    FAINT,
+    GREY,
+    HEAD,
+    HEAD_EDGE,
+    HEAD_LINK,
+    INK,
+    JET,
+    JET_CORE,
+    LINK,
+    PAPER,
+    REFERENCE,
+    RULE,
+    TAIL,
+    TRAIL,
+    WATER,
+    Colour,
+    Points,
+    outlines,
+)
+from usm_gym.rendering.panel import LEFT, MIDDLE, RIGHT, Panel, write
+from usm_gym.rendering.picture import Picture
 from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.scenario import Scenario
 
 Frame = NDArray[np.uint8]
-
-# The colours of Okabe and Ito, which colour-blind people can tell apart, and tints of them.
-GREY, FAINT, RULE, WATER = (96, 110, 118), (222, 230, 235), (200, 210, 217), (243, 248, 251)
-ERROR_COLOURS = ((0, 114, 178), (213, 94, 0))
-BODY, BODY_EDGE = (203, 215, 224), (84, 104, 120)
-HEAD, HEAD_EDGE = (240, 178, 60), (140, 92, 0)
-TAIL = (150, 168, 182)
-JET, JET_CORE = (176, 218, 243), (86, 180, 233)
-CURRENT = (70, 130, 160)
-REFERENCE = (196, 120, 164)
-TRAIL = (0, 140, 105)
-ALARM = (176, 36, 24)
 
 # Everything is laid out on 640 x 480 points.
 WIDTH, HEIGHT = 640, 480
@@ -42,12 +55,6 @@ JET_LENGTH = 0.36
 # How much of the past the lens shows, s.
 LENS_PAST = 2.0
 SCALES = tuple(digit * 10.0**power for power in (-4, -3, -2, -1, 0) for digit in (1, 2, 5))
-# Superellipses, tail to head: the outline of a link over its half length and half width.
-_TURN = np.linspace(0.0, 2 * np.pi, 28, endpoint=False)
-_COS, _SIN = np.cos(_TURN), np.sin(_TURN)
-LINK = np.stack([_COS, _SIN], axis=1)
-LINK = np.sign(LINK) * np.abs(LINK) ** (0.45, 0.6)
-HEAD_LINK = np.where(_COS[:, np.newaxis] > 0, np.stack([1.35 * _COS, _SIN], axis=1), LINK)
 
 
 def error_scale(errors: Points) -> float:
@@ -138,7 +145,7 @@ class Canvas:
         scene.clear()
         self._centre = picture.path[picture.instants[-1]]
         self._grid()
-        for points in self._in_scene(_links(picture, picture.reference)):
+        for points in self._in_scene(outlines(picture.robot, picture.reference)):
             scene.outline(points, 1.5, REFERENCE)
         self._jets(picture)
         self._body(picture)
@@ -163,7 +170,7 @@ class Canvas:
                 self._scene.line(ends, 0.8, FAINT)
 
     def _body(self, picture: Picture) -> None:
-        links = self._in_scene(_links(picture, picture.body))
+        links = self._in_scene(outlines(picture.robot, picture.body))
         centres = self._in_scene(picture.body.centres)
         self._scene.disc((centres[:-1] + centres[1:]) / 2, 6.0, BODY_EDGE)
         for points in links:
@@ -308,18 +315,6 @@ def _draw_jet(panel: Panel, start: Points, flow: Points, breadth: float = 1.0) -
         tip = start + share * ahead
         corners = [start - 0.5 * wide, end - wide, tip, end + wide, start + 0.5 * wide]
         panel.shape(np.array(corners), colour, colour)
-
-
-def _links(picture: Picture, posture: Posture) -> Points:
-    """Outlines of the links, m, (links, corners, 2)."""
-    robot = picture.robot
-    outlines = np.repeat(LINK[np.newaxis], robot.links, axis=0)
-    outlines[-1] = HEAD_LINK
-    outlines = outlines * (0.97 * robot.half_length, robot.half_width)
-    along = np.stack([np.cos(posture.angles), np.sin(posture.angles)], axis=1)[:, np.newaxis]
-    left = along[..., ::-1] * (-1, 1)
-    turned = outlines[..., :1] * along + outlines[..., 1:] * left
-    return np.asarray(posture.centres[:, np.newaxis] + turned)
 
 
 def _thinned(points: Points, most: int = 4000) -> Points:

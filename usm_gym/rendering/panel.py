@@ -8,16 +8,13 @@ from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 import matplotlib
 import pygame
 
-Points = NDArray[np.float64]
-Colour = tuple[int, int, int]
+from usm_gym.rendering.look import INK, PAPER, Colour, Points
 
-INK, PAPER = (38, 50, 56), (255, 255, 255)
 # A panel is drawn larger by this factor and scaled down, which smooths all edges; words are already
 # smooth.
 OVER = 2

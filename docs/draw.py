@@ -1,0 +1,106 @@
+"""Draws the pictures of the pages anew: `python docs/draw.py`."""
+
+from pathlib import Path
+
+import numpy as np
+
+from usm_gym.rendering.figure import robot_drawing
+from usm_gym.rendering.svg import arrow, box, document, group, text
+from usm_gym.robot import Robot
+from usm_gym.task.conditions import FIELD
+
+SIZE = 640, 418
+BLOCK = np.array([160.0, 84.0])
+# Left sides of the columns, tops of the rows.
+COLUMNS, ROWS = (32.0, 240.0, 448.0), (112.0, 302.0)
+# Row, column, colour, name, what it does.
+BLOCKS = (
+    (0, 0, "thrust", "Thrusters", "lag, dead-band,", "gain, limit"),
+    (0, 1, "edge", "Plant", "links, joints, drag,", "added mass"),
+    (0, 2, "edge", "Sensors", "noisy, late, rare,", "sometimes missing"),
+    (1, 2, "head-edge", "Navigator", "estimates error,", "rate, disturbance"),
+    (1, 1, "head-edge", "Law", "asks for a force", "and a moment"),
+    (1, 0, "head-edge", "Allocation", "shares them out", "among thrusters"),
+)
+
+
+def control_loop() -> str:
+    """Draw what stands between a scenario and the thrusters, and what passes between them."""
+    step, period = 1e3 * FIELD.physics_step, 1e3 * FIELD.control_period
+    description = (
+        "A scenario sets up thrusters, plant and sensors, which are the environment. The "
+        "observation leads from the sensors to the policy: navigator, law and allocation. Its "
+        "action leads back to the thrusters. Reward and score come from the plant."
+    )
+    marks = [
+        *_frame(16, 196, f"environment: steps of {step:g} ms"),
+        *_frame(262, 140, f"policy: every {period:g} ms"),
+        _scenario(),
+        *(_block(*block) for block in BLOCKS),
+        *_signals(),
+    ]
+    return document(SIZE, "From a scenario to the thrusters and back", description, marks)
+
+
+def _frame(top: float, height: float, name: str) -> list[str]:
+    middle = SIZE[0] / 2
+    return [
+        box("panel", (16, top), (SIZE[0] - 32, height), "rule", "5 4"),
+        text(name, (middle, top), (0, 22), "small", "quiet", "middle"),
+    ]
+
+
+def _scenario() -> str:
+    left, right = COLUMNS[0], COLUMNS[-1] + BLOCK[0]
+    top, height = 48.0, 36.0
+    contents = "path, joint motion, water, conditions, seed"
+    marks = [
+        box("card", (left, top), (right - left, height), "edge"),
+        text("Scenario", (left, top), (14, 24), "title", halo=""),
+        text(contents, (right, top), (-14, 24), "small", anchor="end", halo=""),
+    ]
+    for x in np.add(COLUMNS, BLOCK[0] / 2):
+        marks.append(arrow("quiet", (x, top + height), (x, ROWS[0]), 2))
+    return group("scenario", *marks)
+
+
+def _block(row: int, column: int, colour: str, name: str, *words: str) -> str:
+    corner = np.array([COLUMNS[column], ROWS[row]])
+    x = BLOCK[0] / 2
+    marks = [text(name, corner, (x, 26), "title", anchor="middle", halo="")]
+    for k, line in enumerate(words):
+        marks.append(text(line, corner, (x, 49 + 20 * k), "small", anchor="middle", halo=""))
+    return group(name.lower(), box("card", corner, BLOCK, colour), *marks)
+
+
+def _signals() -> list[str]:
+    (first, second, third), (above, below), (width, height) = COLUMNS, ROWS, BLOCK
+    marks = []
+    for start, end, row, words, colour in (
+        (first + width, second, above, "*f*_j", "thrust"),
+        (second + width, third, above, "*p*, *θ*_i", "ink"),
+        (third, second + width, below, "*ê*", "error"),
+        (second, first + width, below, "*F*, *M*", "ink"),
+    ):
+        y = row + height / 2
+        marks.append(arrow(colour, (start, y), (end, y), 2.6))
+        marks.append(text(words, ((start + end) / 2, y), (0, -10), name=colour, anchor="middle"))
+    left, middle, right = np.add(COLUMNS, width / 2)
+    bottom = above + height
+    return [
+        *marks,
+        arrow("ink", (right, bottom), (right, below), 2.6),
+        text("observation", (right, 242), (-12, 0), anchor="end"),
+        arrow("thrust", (left, below), (left, bottom), 2.6),
+        text("action", (left, 242), (12, 0), name="thrust"),
+        arrow("error", (middle, bottom), (middle, 228), 2.6),
+        text("reward, score", (middle, 248), name="error", anchor="middle"),
+    ]
+
+
+DRAWINGS = {"robot.svg": lambda: robot_drawing(Robot()), "control_loop.svg": control_loop}
+
+
+if __name__ == "__main__":
+    for name, draw in DRAWINGS.items():
+        Path(__file__).with_name(name).write_text(draw(), encoding="utf-8", newline="\n")
