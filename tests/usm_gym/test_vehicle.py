@@ -11,17 +11,18 @@ from support import oracle
 
 import usm_gym
 from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Vehicle
-from usm_gym.plant import layout as rows
 from usm_gym.simulation import Simulation
+from usm_gym.task.observation import ObservationLayout
 
 # Everything is nominal and measured exactly.
 CALM = Conditions(current_limit=0.0, coefficient_range=(1.0, 1.0), position_noise=0.0)
 MOVING = Path(speed=0.08, amplitude=0.2, frequency=0.15, ramp=1.0)
-BENDS = Inspection(times=(0.2, 1.5), deflections=(1.4, -1.2))
-AT_ONCE = dict.fromkeys(("position_delay", "position_missing"), 0)
+PAPER = Robot()
+SIZE = ObservationLayout(PAPER.links, len(PAPER.thrusters)).size
+BENDS = Inspection(bending_joints=6, times=(0.2, 1.5), deflections=(1.4, -1.2))
 
 
-def swimming(size=3, robot=None, **conditions):
+def swimming(size=3, robot=PAPER, **conditions):
     """Robots that follow a path and bend, each by its own angle, and their vehicle."""
     scenario = Scenario(
         path=MOVING, inspection=BENDS, conditions=replace(CALM, **conditions), robot=robot
@@ -35,13 +36,13 @@ def swim(simulation, vehicle, steps, force=1.0):
     """Random thrust for a while; what is seen and kept in the end."""
     stream, memory = np.random.default_rng(0), None
     for _ in range(steps):
-        seen, memory = vehicle.read(simulation.observation, memory)
+        _, memory = vehicle.read(simulation.observation, memory)
         action = stream.uniform(-force, force, (simulation.size, simulation.world.thrusters))
         simulation.step((action / CALM.thruster_limit).astype(np.float32))
     return vehicle.read(simulation.observation, memory)
 
 
-def rigid(robot, theta):
+def rigid(robot):
     """Velocities of all joints and the centre of mass over those of a body held stiff."""
     stiff = np.zeros((robot.links + 2, 3))
     stiff[robot.links :, :2], stiff[: robot.links, 2] = np.eye(2), 1.0
@@ -51,15 +52,16 @@ def rigid(robot, theta):
 def true_wrench(robot, theta, forces):
     """Force and moment of the thrusters by virtual work on the dense model."""
     thrust = oracle.input_matrix(robot, theta)[:, robot.links - 1 :]
-    return rigid(robot, theta).T @ thrust @ forces
+    return rigid(robot).T @ thrust @ forces
 
 
 OTHER = Robot(
-    links=7, thrusters=tuple(Thruster(1 + i, kind) for i, kind in enumerate(("normal", "axial") * 3))
+    links=7,
+    thrusters=tuple(Thruster(1 + i, kind) for i, kind in enumerate(("normal", "axial") * 3)),
 )
 
 
-@pytest.mark.parametrize("robot", [None, OTHER], ids=["paper", "other"])
+@pytest.mark.parametrize("robot", [PAPER, OTHER], ids=["paper", "other"])
 def test_an_allocated_wrench_is_what_the_thrusters_make_and_the_cheapest_way_to_it(robot):
     simulation, vehicle = swimming(robot=robot)
     seen, _ = swim(simulation, vehicle, 40)
@@ -71,7 +73,7 @@ def test_an_allocated_wrench_is_what_the_thrusters_make_and_the_cheapest_way_to_
         np.testing.assert_allclose(true_wrench(vehicle.robot, theta, force), wrench, atol=1e-5)
         # Nothing in it is without effect.
         thrust = oracle.input_matrix(vehicle.robot, theta)[:, vehicle.robot.links - 1 :]
-        idle = np.linalg.svd(rigid(vehicle.robot, theta).T @ thrust)[2][3:]
+        idle = np.linalg.svd(rigid(vehicle.robot).T @ thrust)[2][3:]
         np.testing.assert_allclose(idle @ force, 0.0, atol=1e-5)
 
 
@@ -92,24 +94,26 @@ def test_what_is_seen_is_what_happens():
 
 
 @pytest.mark.parametrize(
-    ("conditions", "exact"),
+    ("conditions", "periods"),
     [
-        ({}, 2e-3),
-        ({"position_period": 4}, 6e-3),
-        ({"position_period": 4, "position_delay": 3, "position_missing": 0.2}, 1.2e-2),
-        ({"velocity_period": 1}, 1e-7),
+        ({}, 8),
+        ({"position_period": 4}, 16),
+        ({"position_period": 4, "position_delay": 3, "position_missing": 0.2}, 30),
+        ({"velocity_period": 1}, 1),
     ],
     ids=["at once", "rare", "late", "measured"],
 )
-def test_the_velocity_error_is_right_whatever_measures_it(conditions, exact):
+def test_the_velocity_error_is_a_mean_of_the_last_ones_whatever_measures_it(conditions, periods):
     simulation, vehicle = swimming(**conditions)
-    seen, _ = swim(simulation, vehicle, 100)
-    h = vehicle.period
-    later, _ = vehicle.read(simulation.observation)
-    true = simulation.read("velocity") - later.reference_velocity
-    assert np.abs(true).max() > 4e-2
-    np.testing.assert_allclose(seen.velocity_error, true, atol=exact)
-    assert h == CALM.control_period
+    memory, true = None, []
+    for _ in range(150):
+        seen, memory = vehicle.read(simulation.observation, memory)
+        true.append(simulation.read("velocity") - seen.reference_velocity)
+        last = np.array(true[-periods:])
+        assert (seen.velocity_error > last.min(axis=0) - 2e-4).all()
+        assert (seen.velocity_error < last.max(axis=0) + 2e-4).all()
+        simulation.step(np.zeros((3, 5), np.float32))
+    assert np.ptp(true, axis=0).min() > 0.02
 
 
 def test_a_robot_starts_at_rest():
@@ -146,12 +150,12 @@ def test_inertia_and_linear_model_are_those_of_the_dense_model_held_stiff(bend):
     nominal = replace(Scenario().nominal, thruster_time_constant=0.0)
     theta = 0.4 + bend * np.arange(robot.links)
     inertia = Vehicle(nominal).inertia(theta)
-    stiff = rigid(robot, theta)
-    np.testing.assert_allclose(inertia, stiff.T @ oracle.mass_matrix(robot, theta) @ stiff)
+    stiff = rigid(robot)
+    expected = stiff.T @ oracle.mass_matrix(robot, theta) @ stiff
+    np.testing.assert_allclose(inertia, expected, atol=1e-9)
     # The plant answers to slow motion, and to thrust, with torques that hold the joints.
     model = Vehicle(nominal).linear_model(theta)
-    still, joints = np.zeros(robot.links), np.eye(robot.links - 1)
-    none = np.zeros(len(robot.thrusters))
+    joints, none = np.eye(robot.links - 1), np.zeros(len(robot.thrusters))
 
     def answer(motion, torques, forces):
         rates = np.full(robot.links, motion[2])
@@ -170,7 +174,6 @@ def test_inertia_and_linear_model_are_those_of_the_dense_model_held_stiff(bend):
             scale = np.abs(expected).max()
             found = np.append(held[robot.links :], held[0])
             np.testing.assert_allclose(found, expected, atol=1e-5 * scale)
-    assert still.shape == theta.shape
 
 
 def test_the_linear_model_predicts_what_is_seen_of_a_stiff_robot():
@@ -222,7 +225,7 @@ def test_environments_take_what_is_allocated_and_processes_a_vehicle():
     [
         (lambda vehicle, seen: vehicle.read(np.zeros(5)), "the observation's shape is"),
         (lambda vehicle, seen: vehicle.read("all"), "observation is 'all'"),
-        (lambda vehicle, seen: vehicle.read(np.zeros(100), np.zeros(2)), "shape of the memory is"),
+        (lambda vehicle, seen: vehicle.read(np.zeros(SIZE), np.zeros(2)), "shape of the memory is"),
         (lambda vehicle, seen: vehicle.allocate([1.0], [0.0], seen), "shape of the force is"),
         (lambda vehicle, seen: vehicle.allocate([1.0, 0.0], 0.0, seen), "shape of the moment is"),
         (lambda vehicle, seen: vehicle.inertia(np.zeros(15)), "link_angles' shape is"),
@@ -234,7 +237,6 @@ def test_environments_take_what_is_allocated_and_processes_a_vehicle():
 )
 def test_what_does_not_fit_is_refused(call, message):
     vehicle = Vehicle(Scenario().nominal)
-    size = vehicle._world.layout.size
-    seen, _ = vehicle.read(np.zeros(size))
+    seen, _ = vehicle.read(np.zeros(SIZE))
     with pytest.raises(ValueError, match=message):
         call(vehicle, seen)
