@@ -13,6 +13,7 @@ from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import max_error
 from usm_gym.task.scenario import Inspection, Path, Scenario
 from usm_gym.task.water import Water, Wave
+from usm_gym.vehicle import Vehicle
 
 __all__ = [
     "Conditions",
@@ -24,6 +25,7 @@ __all__ = [
     "Robot",
     "Scenario",
     "Thruster",
+    "Vehicle",
     "Water",
     "Wave",
     "accelerations",

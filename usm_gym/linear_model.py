@@ -39,17 +39,17 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """A linear model in discrete time: x(k + 1) = A x(k) + B u(k).
+    """A linear model: x(k + 1) = A x(k) + B u(k), or x' = A x + B u where the period is 0.
 
     States and inputs are deviations from the operating point, in the order of `states` and
-    `inputs`; the inputs are held for a period.
+    `inputs`; in discrete time the inputs are held for a period.
 
     Attributes:
         A: From states to states, (x, x).
         B: From inputs to states, (x, u).
         states: Names, sizes and units of the states, in order.
         inputs: The same of the inputs.
-        period: Time between two instants k, the control period, s.
+        period: Time between two instants k, the control period, s; 0 in continuous time.
     """
 
     A: Array

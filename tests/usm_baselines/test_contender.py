@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from support.episodes import short
 from usm_baselines.contender import contender
@@ -123,18 +122,20 @@ def test_what_is_missing_is_said(mine: str, name: str, said: str) -> None:
         contender(name).make(NOMINAL)
 
 
-def test_the_example_in_the_documentation_works_when_copied(
+def test_the_examples_in_the_documentation_work_when_copied(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[0]
-    (tmp_path / "my_controller.py").write_text(code)
+    saved = re.findall(r"Save this as `(.+?)`:\n\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    for name, code in saved:
+        (tmp_path / name).write_text(code)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-    policy = contender("my_controller:MyController").make(NOMINAL)
+    names = "zero", "my_controller:MyPD", "my_lqr:MyLQR"
     scenarios = short(4, duration=8.0)
     errors = [
-        usm_gym.evaluate(each, scenarios).per_episode["max_error_x"]
-        for each in (policy, contender("zero").make(NOMINAL))
+        usm_gym.evaluate(contender(name).make(NOMINAL), scenarios).per_episode["max_error_x"].mean()
+        for name in names
     ]
-    assert np.mean(errors[0]) < 0.5 * np.mean(errors[1])
-    assert len(code.splitlines()) <= 40
+    assert errors[2] < errors[1] < 0.1 * errors[0]
+    lines = {name: len([*filter(None, code.splitlines())]) for name, code in saved}
+    assert (lines["my_controller.py"], lines["my_lqr.py"] <= 30) == (8, True)

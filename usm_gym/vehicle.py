@@ -1,0 +1,260 @@
+"""What a control law of one's own needs of the robot: named signals, allocation, a linear model."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from usm_gym.linear_model import LinearModel, Variable
+from usm_gym.robot import Robot
+from usm_gym.support.validation import real_array, require
+from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
+
+Array = NDArray[np.float64]
+
+# Time constant of the filter behind a rate that is taken from positions, s.
+RATE_FILTER = 0.02
+# What `read` keeps, first of all whether the episode has begun.
+BEGUN, AGE, ERROR, RATE, FORCES = slice(0, 1), slice(1, 2), slice(2, 4), slice(4, 6), slice(6, None)
+
+
+class Vehicle:
+    """The nominal robot as a controller deals with it.
+
+    It knows what may be known beforehand, and nothing that is drawn for an episode. All arrays may
+    have axes in front of the last one; a single observation has none, a batch has one.
+
+    ```python
+    vehicle = usm_gym.Vehicle(nominal)
+    seen, memory = vehicle.read(observation)
+    action = vehicle.allocate(-300.0 * seen.position_error, -100.0 * seen.heading_error, seen)
+    ```
+
+    Attributes:
+        nominal: The nominal knowledge.
+        robot: The robot with its nominal coefficients.
+        period: Control period, s.
+        mass: Mass, without that of the water which moves along, kg.
+    """
+
+    def __init__(self, nominal: Nominal) -> None:
+        """Take what is known of the robot: what a controller is made with, or that of environments.
+
+        Args:
+            nominal: `env.unwrapped.nominal`.
+
+        Raises:
+            ValueError: If it is none, or that of a robot that is not the planar one.
+        """
+        require(isinstance(nominal, Nominal), "nominal", nominal, "a Nominal, as environments have")
+        require(isinstance(nominal.robot, Robot), "robot", nominal.robot, "the planar robot")
+        self.nominal = nominal
+        self.robot: Robot = nominal.robot
+        self.period = nominal.control_period
+        self.mass = self.robot.total_mass
+        self._world = world_of(self.robot)
+
+    def read(
+        self, observation: ArrayLike, memory: ArrayLike | None = None, episode_start: Any = None
+    ) -> tuple[SimpleNamespace, Array]:
+        """Read an observation, or a batch of them, in SI units.
+
+        Every entry of the observation (docs/tasks.md) is an attribute, (..., size of the entry), an
+        entry of one number included. Beside them there are
+
+        | attribute | size | unit | |
+        |---|---|---|---|
+        | `velocity_error` | 2 | m/s | velocity minus that of the reference, global frame |
+        | `link_angles` | links | rad | from the tail, against the x axis |
+        | `heading_rate` | 1 | rad/s | rate of the mean link angle |
+        | `thruster_forces` | thrusters | N | by the commands, and the nominal lag and dead-band |
+        | `wrench` | 3 | N, N, N m | force (x, y) and moment of these, global frame |
+        | `allocation` | (3, thrusters) | 1, 1, m | from forces of the thrusters to that wrench |
+        | `state` | 9, or 6 | | the states of `linear_model`, as deviations from the reference |
+
+        `velocity_error` is the difference of two measured positions over their distance in time,
+        filtered with a time constant of 0.02 s; where something measures the velocity, it is taken
+        from that instead. It is as late as the measurements are.
+
+        Args:
+            observation: (..., numbers), as environments give it.
+            memory: What the last call returned; None at the start.
+            episode_start: Where an episode has just begun, so that the memory is dropped: a bool or
+                an array of them, (...).
+
+        Returns:
+            What is seen, and the memory for the next call.
+
+        Raises:
+            ValueError: If a shape is wrong.
+        """
+        given, layout = real_array("observation", observation), self._world.layout
+        shape, allowed = given.shape, f"({layout.size},) or (batch, {layout.size})"
+        require(shape[-1:] == (layout.size,), "the observation's shape", shape, allowed)
+        values = given * layout.scale
+        seen = SimpleNamespace(**{name: values[..., part] for name, part in layout.slices.items()})
+        links, thrusters = self.robot.links, len(self.robot.thrusters)
+        allocation = np.empty((math.prod(shape[:-1]), 3, thrusters))
+        self._world.allocate(given.reshape(-1, layout.size).astype(np.float32), allocation)
+        seen.allocation = allocation.reshape(*shape[:-1], 3, thrusters)
+        bends = np.cumsum(seen.joint_angles, axis=-1)
+        seen.link_angles = np.concatenate([seen.tail_angle, seen.tail_angle - bends], axis=-1)
+        # Joint i turns the links between it and the head.
+        turned = np.arange(links - 1, 0, -1) / links
+        turning = (seen.joint_rates * turned).sum(axis=-1, keepdims=True)
+        seen.heading_rate = seen.tail_rate - turning
+        return seen, self._remember(seen, self._memory(shape[:-1], memory, episode_start))
+
+    def allocate(self, force: ArrayLike, moment: ArrayLike, seen: SimpleNamespace) -> Array:
+        """Share a force and a moment out among the thrusters, with as little force as possible.
+
+        The body's shape at the moment counts. What is beyond the limit of a thruster saturates when
+        it is applied.
+
+        Args:
+            force: Force on the centre of mass, global frame, N, (..., 2).
+            moment: Moment about it, anticlockwise, N m, (..., 1).
+            seen: What `read` has returned.
+
+        Returns:
+            The action: commands over the thruster limit, (..., thrusters).
+
+        Raises:
+            ValueError: If a shape is wrong.
+        """
+        batch = seen.allocation.shape[:-2]
+        wanted = []
+        for name, value, size in (("force", force, 2), ("moment", moment, 1)):
+            array = real_array(name, value)
+            allowed = f"shape {(*batch, size)}"
+            require(array.shape == (*batch, size), f"shape of the {name}", array.shape, allowed)
+            wanted.append(array)
+        wrench = np.concatenate(wanted, axis=-1)[..., np.newaxis]
+        T = seen.allocation
+        transposed = np.swapaxes(T, -1, -2)
+        forces = transposed @ np.linalg.solve(T @ transposed, wrench)
+        return np.asarray(forces[..., 0] / seen.thruster_limit)
+
+    def inertia(self, link_angles: ArrayLike | None = None) -> Array:
+        """Inertia of the robot with the water that moves along, its joints held.
+
+        Args:
+            link_angles: Link angles from the tail, against the x axis, rad, (..., links); without
+                them the body lies straight along x.
+
+        Returns:
+            From the accelerations of the centre of mass (x, y) and of the heading to force and
+            moment, (..., 3, 3), in kg, kg m and kg m^2.
+        """
+        return self._inertia_and_drag(link_angles)[0]
+
+    def linear_model(self, link_angles: ArrayLike | None = None) -> LinearModel:
+        """Linear model of the robot about rest in still water, its joints held.
+
+        In continuous time, x' = A x + B u, with the states
+
+        | state | size | unit | |
+        |---|---|---|---|
+        | `position` | 2 | m | centre of mass, global frame (x, y) |
+        | `heading` | 1 | rad | mean link angle |
+        | `velocity` | 2 | m/s | of the centre of mass, global frame |
+        | `heading_rate` | 1 | rad/s | |
+        | `wrench` | 3 | N, N, N m | in effect; only if the thrusters have a lag |
+
+        The input is the `wrench` that is asked for: force (x, y), N, and moment, N m. `allocate`
+        makes an action of it, and `read` has the states as `state`.
+
+        The drag is that at rest: the quadratic one, which counts from some 0.1 m/s on, is
+        left out. `usm_gym.linearise` gives a model in which the joints give way.
+
+        Args:
+            link_angles: The body's shape, as of `inertia`, (links,).
+
+        Returns:
+            The model, with a period of 0.
+
+        Raises:
+            ValueError: If the shape is wrong.
+        """
+        inertia, drag = self._inertia_and_drag(link_angles)
+        require(inertia.ndim == 2, "link_angles", link_angles, f"shape ({self.robot.links},)")
+        lag = self.nominal.thruster_time_constant
+        states: tuple[Variable, ...] = (
+            Variable("position", 2, "m"),
+            Variable("heading", 1, "rad"),
+            Variable("velocity", 2, "m/s"),
+            Variable("heading_rate", 1, "rad/s"),
+        )
+        A, B = np.zeros((6, 6)), np.zeros((6, 3))
+        A[:3, 3:] = np.eye(3)
+        A[3:, 3:], B[3:] = -np.linalg.solve(inertia, drag), np.linalg.inv(inertia)
+        wrench = Variable("wrench", 3, "N, N, N m")
+        if lag > 0.0:
+            states = (*states, wrench)
+            A = np.block([[A, B], [np.zeros((3, 6)), -np.eye(3) / lag]])
+            B = np.concatenate([np.zeros((6, 3)), np.eye(3) / lag])
+        return LinearModel(A, B, states, (wrench,), period=0.0)
+
+    def _inertia_and_drag(self, link_angles: ArrayLike | None) -> tuple[Array, Array]:
+        """Inertia, and linear drag over velocities instead of accelerations, (..., 3, 3)."""
+        robot = self.robot
+        given = np.zeros(robot.links) if link_angles is None else link_angles
+        theta = real_array("link_angles", given)
+        allowed = f"({robot.links},) or (batch, {robot.links})"
+        require(theta.shape[-1:] == (robot.links,), "link_angles' shape", theta.shape, allowed)
+        require(np.isfinite(theta).all(), "link_angles", link_angles, "finite numbers")
+        along = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+        place = robot.link_length * (np.cumsum(along, axis=-2) - 0.5 * along)
+        place -= place.mean(axis=-2, keepdims=True)
+        across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+        # Velocities of the links along and across themselves, over those of the whole.
+        lever = np.stack([-place[..., 1], place[..., 0]], axis=-1)
+        rows = [
+            np.concatenate([axis, (axis * lever).sum(axis=-1, keepdims=True)], axis=-1)
+            for axis in (along, across)
+        ]
+        squares = [np.swapaxes(row, -1, -2) @ row for row in rows]
+        turning = robot.links * np.diag([0.0, 0.0, 1.0])
+        mass, added = robot.link_mass, robot.added_mass
+        inertia = mass * squares[0] + (mass + added) * squares[1]
+        inertia = inertia + (robot.link_inertia + robot.added_inertia) * turning
+        drag = robot.tangential_drag * squares[0] + robot.normal_drag * squares[1]
+        return inertia, drag + robot.linear_yaw_drag * turning
+
+    def _memory(self, batch: tuple[int, ...], memory: ArrayLike | None, start: Any) -> Array:
+        shape = (*batch, FORCES.start + len(self.robot.thrusters))
+        if memory is None:
+            return np.zeros(shape)
+        kept = np.array(real_array("memory", memory), np.float64)
+        require(kept.shape == shape, "shape of the memory", kept.shape, f"{shape}")
+        kept[np.broadcast_to(np.asarray(start, bool), batch)] = 0.0
+        return kept
+
+    def _remember(self, seen: SimpleNamespace, memory: Array) -> Array:
+        """Move the memory on by an observation, and fill in what follows from it."""
+        begun = memory[..., BEGUN] > 0.0
+        # Between two measured positions; no new one, no time.
+        passed = memory[..., AGE] + self.period - seen.position_age
+        fresh = passed > 0.5 * self.period
+        slope = (seen.position_error - memory[..., ERROR]) / np.where(fresh, passed, 1.0)
+        share = np.where(fresh, -np.expm1(-np.maximum(passed, 0.0) / RATE_FILTER), 0.0)
+        rate = memory[..., RATE] + share * (slope - memory[..., RATE])
+        rate = np.where(begun, rate, -seen.reference_velocity)
+        measured = seen.velocity_age >= 0.0
+        seen.velocity_error = np.where(measured, seen.velocity - seen.reference_velocity, rate)
+        command = seen.thruster_command * seen.thruster_limit
+        target = np.where(np.abs(command) >= self.nominal.thruster_dead_band, command, 0.0)
+        lag = self.nominal.thruster_time_constant
+        way = 1.0 if lag == 0.0 else -math.expm1(-self.period / lag)
+        forces = memory[..., FORCES]
+        seen.thruster_forces = forces + way * (target - forces)
+        seen.wrench = (seen.allocation @ seen.thruster_forces[..., np.newaxis])[..., 0]
+        state = [seen.position_error, seen.heading_error, seen.velocity_error, seen.heading_rate]
+        seen.state = np.concatenate([*state, *([seen.wrench] if lag > 0.0 else [])], axis=-1)
+        kept = (np.ones_like(begun, float), seen.position_age, seen.position_error, rate)
+        return np.concatenate([*kept, seen.thruster_forces], axis=-1)
