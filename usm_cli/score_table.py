@@ -27,6 +27,7 @@ from usm_baselines.benchmark.results import (
 from usm_cli.terminal import empty_table
 from usm_gym.statistics import FEWEST_EPISODES, mean_interval, ratio_interval
 from usm_gym.support.text import degrees, figures, give_or_take, listed, mm
+from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
 
 LEGEND = """\
@@ -36,7 +37,7 @@ Order: the objective, which is the error plus {attitude} mm per degree of headin
 {variation} mm per N/s. Rows that the data do not tell apart share a rank (=)."""
 UNRANKED = "Rows without a rank are no competitors: they are told more than a vehicle knows."
 # What a lost robot counts at least, mm.
-LOSS = 500
+LOSS = round(1e3 * LOST_ERROR)
 # The column that is never cut.
 POLICY = "policy"
 # Wider than any table.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from usm_baselines.benchmark.leaderboard import ranked
@@ -29,6 +29,7 @@ from usm_cli.terminal import output_console
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
+from usm_gym.task.scenario import Scenario
 
 DESCRIPTION = """\
 Score policies. The score of an episode is the largest true position error after settling (5 s, in
@@ -82,6 +83,22 @@ def run(arguments: argparse.Namespace) -> None:
     chosen = jobs(contenders, scenarios, arguments.time_limit)
     scores, refused = by_name(chosen, scored(chosen, arguments))
     known = {job.contender.name: job.contender for job in chosen}
+    if arguments.output:
+        write(arguments, scenarios, known, scores, refused)
+    if scores:
+        where = f"{suite_name(arguments) or 'sampled'}, {len(scenarios)} scenarios, best first"
+        show([(known[name], evaluation) for name, evaluation in scores.items()], where)
+    leave_if_refused(refused)
+
+
+def write(
+    arguments: argparse.Namespace,
+    scenarios: Sequence[Scenario],
+    known: Mapping[str, Contender],
+    scores: Mapping[str, Evaluation],
+    refused: Mapping[str, str],
+) -> None:
+    """Write the file of results."""
     result = EvaluationResult(
         suite=suite_name(arguments),
         conditions=scenarios[0].conditions,
@@ -96,12 +113,7 @@ def run(arguments: argparse.Namespace) -> None:
         refused=refused,
         provenance=Provenance.here(seeds(arguments)),
     )
-    if arguments.output:
-        result.write(arguments.output)
-    if scores:
-        where = f"{result.suite or 'sampled'}, {result.episodes} scenarios, best first"
-        show([(known[name], evaluation) for name, evaluation in scores.items()], where)
-    leave_if_refused(refused)
+    result.write(arguments.output)
 
 
 def show(scores: Sequence[tuple[Contender, Evaluation]], where: str) -> None:

@@ -155,9 +155,9 @@ def score_all(
             index, place = places[number]
             waiting[index][place] = outcome
             done.finish(number)
-            known = [each for each in waiting[index] if each is not None]
-            if len(known) == len(waiting[index]):
-                outcomes[index] = _whole(known)
+            parts_done = [each for each in waiting[index] if each is not None]
+            if len(parts_done) == len(waiting[index]):
+                outcomes[index] = _whole(parts_done)
                 _write(cache, jobs[index], outcomes[index])
     return [outcomes[index] for index in range(len(jobs))]
 
