@@ -120,7 +120,7 @@ def show(scores: Sequence[tuple[Contender, Evaluation]], where: str) -> None:
     """Print the table, what its columns mean, and who wins."""
     console = output_console()
     rows = ranked(scores)
-    console.print(where)
+    console.print(where, markup=False)
     console.print(table(rows, console))
     if shifts_in(rows.values()):
         console.print(shift_table(rows, console))
