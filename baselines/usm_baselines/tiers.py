@@ -63,6 +63,9 @@ def short_list(conditions: Conditions) -> list[str]:
 
 
 def competitors(conditions: Conditions) -> list[str]:
-    """Names of the competitors that are meant for some conditions, without those on request."""
-    policies = {id: entry(id) for id in meant_for(conditions)}
-    return [id for id, each in policies.items() if not (each.on_request or each.privileged)]
+    """Names of the competitors that are meant for some conditions.
+
+    Those on request are left out, unless the short list has them.
+    """
+    policies = {id: entry(id) for id in meant_for(conditions) if not entry(id).privileged}
+    return [id for id, each in policies.items() if id in SHORT_LIST or not each.on_request]
