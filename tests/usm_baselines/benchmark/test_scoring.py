@@ -156,7 +156,7 @@ def test_what_is_kept_is_not_computed_again(
     score_all(jobs, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 1  # neither other people's code nor a refusal
     monkeypatch.setattr(scoring, "score_batch", None)
-    episodes: list[int] = []
+    episodes: list[float] = []
     (again,) = score_all(jobs[:1], cache=tmp_path, progress=episodes.append)
     assert_same(again, first[0])
     assert episodes == [3]
