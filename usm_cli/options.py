@@ -40,10 +40,11 @@ def check_installed(what: str, extra: str, *modules: str) -> None:
             raise UsageError(f"{what} needs {package}: pip install 'usm-gym[{extra}]'")
 
 
-def add_computing(parser: argparse.ArgumentParser) -> None:
-    """Add the options for processes and clusters."""
+def add_computing(parser: argparse.ArgumentParser, default: str = "1") -> None:
+    """Add the options for processes and clusters; `default` says how many processes there are."""
     add = parser.add_argument
-    add("--workers", type=int, metavar="N", help="processes (default: 1; on a cluster: all)")
+    said = f"processes (default: {default}; on a cluster: all)"
+    add("--workers", type=int, metavar="N", help=said)
     add(
         "--cluster",
         metavar="ADDRESS",
@@ -53,13 +54,16 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
 
 
 @contextmanager
-def computing(arguments: argparse.Namespace) -> Iterator[int]:
-    """Make the chosen cluster joblib's backend, and give the number of workers."""
+def computing(arguments: argparse.Namespace, default: int = 1) -> Iterator[int]:
+    """Make the chosen cluster joblib's backend, and give the number of workers.
+
+    Without the option it is `default`, and on a cluster as many as it has.
+    """
     workers = arguments.workers
     allowed = f"1 to {MOST_WORKERS}"
     require(workers is None or 1 <= workers <= MOST_WORKERS, "--workers", workers, allowed)
     if arguments.cluster is None:
-        yield workers or 1
+        yield workers or default
         return
     check_installed("--cluster", "cluster", "ray")
     import ray

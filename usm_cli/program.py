@@ -47,8 +47,8 @@ DESCRIPTION = """\
 Trajectory tracking for an underwater swimming manipulator: score controllers and compare them.
 A first look:
 
-  usm evaluate                 score the policies on the fifty frozen operation scenarios
-  usm policies                 list the policies
+  usm evaluate                 see which policy is best on fifty frozen scenarios
+  usm policies                 list the policies by family
   usm compare A B              decide whether one policy is better than another
   usm leaderboard              score all policies on all frozen suites
   usm robustness --vary noise  see how errors grow when something gets worse
@@ -101,7 +101,8 @@ def parser() -> Parser:
     parser = Parser(prog="usm", description=DESCRIPTION)
     parser.add_argument("--version", action="version", version=f"usm-gym {version('usm-gym')}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    subparsers = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Parser)
+    parser.set_defaults(run=overview)
+    subparsers = parser.add_subparsers(metavar="COMMAND", parser_class=Parser)
     for command in COMMANDS:
         command.add_to(subparsers)
     for subparser in subparsers.choices.values():
@@ -109,3 +110,8 @@ def parser() -> Parser:
             "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
         )
     return parser
+
+
+def overview(arguments: argparse.Namespace) -> None:
+    """Say what `usm` is for and which commands there are."""
+    print(f"{DESCRIPTION}\n`usm COMMAND --help` explains a command and has examples.")

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from joblib import cpu_count
 from usm_agents.policies import named
 from usm_baselines.benchmark.scoring import (
     TIME_LIMIT,
@@ -16,8 +18,7 @@ from usm_baselines.benchmark.scoring import (
     score_all,
 )
 from usm_baselines.contender import Contender
-from usm_baselines.registry import entry
-from usm_baselines.tiers import TIERS, meant_for
+from usm_baselines.tiers import TIERS, competitors, short_list
 
 from usm_cli.options import add_computing, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
@@ -29,17 +30,20 @@ from usm_gym.task.conditions import PRESETS, Conditions
 from usm_gym.task.nominal import shared_nominal
 from usm_gym.task.scenario import MODES, Mode, Scenario
 
+# Stands for all competitors among the names of policies.
+ALL = "all"
 POLICIES = """\
 policies:
   an id (see usm policies), ID@gains.json with gains from `usm tune`, the folder of an agent from
   `usm train`, or my_module:MyController, your own class or function with the predict method of
   Stable-Baselines3 (docs/own_controller.md)
 """
+DEFAULT = "a short list; `all` stands for all competitors meant for the conditions"
+# A process takes as long to start as it takes to score some three policies on fifty episodes.
+EPISODES_PER_PROCESS = 150
 
 
-def add_policies(
-    parser: argparse.ArgumentParser, default: str = "all competitors meant for the conditions"
-) -> None:
+def add_policies(parser: argparse.ArgumentParser, default: str = DEFAULT) -> None:
     """Add the option that names policies."""
     parser.add_argument(
         "--policies", metavar="A,B", help=f"names, separated by commas (default: {default})"
@@ -72,7 +76,7 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
 
 def add_scoring(parser: argparse.ArgumentParser) -> None:
     """Add the options for scoring."""
-    add_computing(parser)
+    add_computing(parser, "one per core, if there is enough to do")
     parser.add_argument(
         "--time-limit",
         type=float,
@@ -84,18 +88,23 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_contenders(names: str | None, conditions: Conditions) -> list[Contender]:
-    """Get the policies that `--policies` names, or those that are meant for conditions."""
-    if names is not None:
-        return named_contenders(names)
-    policies = {id: entry(id) for id in meant_for(conditions)}
-    return [named(id) for id, each in policies.items() if not (each.on_request or each.privileged)]
+    """Get the policies that `--policies` names, or the short list for conditions."""
+    if names is None:
+        return [named(id) for id in short_list(conditions)]
+    listed = [[name] if name != ALL else competitors(conditions) for name in split(names)]
+    return [named(name) for name in dict.fromkeys(chain.from_iterable(listed))]
 
 
 def named_contenders(names: str) -> list[Contender]:
     """Get policies by their names, separated by commas."""
+    return [named(name) for name in dict.fromkeys(split(names))]
+
+
+def split(names: str) -> list[str]:
+    """Split the names of policies at the commas."""
     chosen = [name.strip() for name in names.split(",") if name.strip()]
     require(len(chosen) > 0, "--policies", names, "one name or more")
-    return [named(name) for name in dict.fromkeys(chosen)]
+    return chosen
 
 
 def sampled(arguments: argparse.Namespace) -> bool:
@@ -184,8 +193,9 @@ def scored(
     chosen: Sequence[Job], arguments: argparse.Namespace, cache: Path | None = None
 ) -> list[Evaluation | Refusal]:
     """Run jobs with the workers of the options, and show a progress bar."""
-    with computing(arguments) as workers, progress_bar() as bar:
-        total = sum(len(job.scenarios) for job in chosen)
+    total = sum(len(job.scenarios) for job in chosen)
+    enough = max(1, min(cpu_count(), total // EPISODES_PER_PROCESS))
+    with computing(arguments, enough) as workers, progress_bar() as bar:
         line = bar.add_task("episodes", total=total)
         return score_all(chosen, workers, cache, lambda episodes: bar.advance(line, episodes))
 

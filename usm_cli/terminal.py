@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Iterable
 from typing import Any, NoReturn
@@ -29,9 +30,14 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: error: {said} (see {self.prog} --help)\n")
 
 
+# Columns of a table in a file or a pipe, if the variable COLUMNS does not say another number.
+PIPE_WIDTH = 120
+
+
 def output_console() -> Console:
-    """The console for results: the terminal, or a pipe with full width."""
-    return Console() if sys.stdout.isatty() else Console(width=160, highlight=False)
+    """The console for results: as wide as the terminal, COLUMNS, or `PIPE_WIDTH`."""
+    known = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdecimal()
+    return Console(width=None if known else PIPE_WIDTH, highlight=False)
 
 
 def progress_bar() -> Progress:
@@ -52,7 +58,13 @@ def progress_bar() -> Progress:
 def empty_table(*words: str, numbers: Iterable[str] = (), title: str | None = None) -> Table:
     """A table without rows, with columns of words, then right-aligned columns of numbers."""
     table = Table(
-        *words, title=title, title_justify="left", title_style="", box=SIMPLE_HEAD, pad_edge=False
+        *words,
+        title=title,
+        title_justify="left",
+        title_style="",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
     )
     for heading in numbers:
         table.add_column(heading, justify="right")

@@ -141,8 +141,7 @@ class Comparison:
     @property
     def decided(self) -> bool:
         """Whether the data decide: enough episodes, and an interval that leaves out 0."""
-        low, high = self.difference_ci95
-        return self.episodes >= FEWEST_EPISODES and not low <= 0.0 <= high
+        return _decided(self.episodes, self.difference_ci95)
 
     def verdict(self, first: str, second: str) -> str:
         """Say in words what follows, given the policies' names."""
@@ -182,6 +181,18 @@ def compare(first: ArrayLike, second: ArrayLike) -> Comparison:
     )
 
 
+def told_apart(first: ArrayLike, second: ArrayLike) -> bool:
+    """Whether the data decide between two policies, as `compare` says, without the rest.
+
+    Args:
+        first: Scores of the first policy, one per episode, (episodes,).
+        second: The same of the second policy, in the same order.
+    """
+    differences = np.asarray(second, np.float64) - np.asarray(first, np.float64)
+    enough = differences.size >= FEWEST_EPISODES
+    return enough and _decided(differences.size, interval(np.mean, differences))
+
+
 def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array, Array]:
     """Share of episodes with a score up to each threshold, and its pointwise 95 % interval.
 
@@ -206,6 +217,11 @@ def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array
     )
     limits = np.quantile(drawn / table.size, (0.025, 0.975), axis=0)
     return below.mean(axis=(0, 1)), limits
+
+
+def _decided(episodes: int, difference_ci95: Interval) -> bool:
+    low, high = difference_ci95
+    return episodes >= FEWEST_EPISODES and not low <= 0.0 <= high
 
 
 def _interval(statistic: Callable[..., Any], *sizes: int) -> Interval:

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from functools import partial
 from typing import Any
 
+from usm_baselines.families import Family
 from usm_baselines.gains import FOLDERS, TUNED, GainsFile, read_gains
 from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
 from usm_baselines.laws.disturbance_observer import DisturbanceObserver
@@ -53,6 +54,7 @@ class Registration:
         privileged: Whether it is given true state, and so is no competitor.
         note: What to bear in mind about its scores; empty if nothing.
         tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
+        family: The family under which it is listed; None for a policy of the user's own.
     """
 
     factory: Callable[..., Policy]
@@ -63,6 +65,7 @@ class Registration:
     privileged: bool = False
     note: str = ""
     tuned_for: str = ""
+    family: Family | None = None
 
 
 _entries: dict[str, Registration] = {}
@@ -79,6 +82,7 @@ def register(
     privileged: bool = False,
     note: str = "",
     tuned_for: str = "",
+    family: Family | None = None,
 ) -> None:
     """Register a policy, and as `ID-tuned`, `ID-basin`, `ID-sea` the same with shipped gains.
 
@@ -95,13 +99,14 @@ def register(
         privileged: Whether it is given true state.
         note: What to bear in mind about its scores.
         tuned_for: The preset of conditions that it was trained or tuned for.
+        family: The family under which it is listed.
 
     Raises:
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    about = (told, on_request, privileged, note, tuned_for)
+    about = (told, on_request, privileged, note, tuned_for, family)
     _entries[id] = Registration(factory, summary, chosen, *about)
     for suffix, folder in FOLDERS.items():
         shipped = TUNED / folder / f"{id}.json"
@@ -150,6 +155,7 @@ def tuned(file: GainsFile) -> Registration:
         privileged=base.privileged,
         note=base.note,
         tuned_for=file.tuned_for,
+        family=base.family,
     )
 
 
@@ -217,41 +223,64 @@ LAG = "lag"
 NAVIGATED = "lag, noise, delays, nominal plant"
 BODY, FORESIGHT = "lag, noise, straight body", "lag, noise, nominal plant, joint references"
 
-register("sta", SuperTwisting, "adaptive super-twisting (10)-(20), the paper's gains, implicit")
+register(
+    "sta",
+    SuperTwisting,
+    "the paper's adaptive super-twisting law with its gains, made stable at this control rate",
+    family=Family.SLIDING_MODE,
+)
 register(
     "sta-explicit",
     partial(SuperTwisting, implicit=False),
-    "the same by Euler's forward method, as the paper has it",
+    "the same law stepped as the paper has it, which needs a far higher control rate",
     space={},
+    family=Family.SLIDING_MODE,
 )
 register(
     "sta-shtessel",
     partial(SuperTwisting, fall=1.0),
-    "super-twisting with the adaptation of Shtessel et al., by which gains fall again",
+    "super-twisting whose gains also fall again (Shtessel et al.)",
+    family=Family.SLIDING_MODE,
 )
-register("pd", PD, "PD (21) as a force, the paper's gains")
+register("pd", PD, "the paper's PD with its gains, as a force", family=Family.PD)
 register(
     "pd-mass",
     partial(PD, reading="mass"),
-    "PD (21) times the mass, with feedforward",
+    "the same PD read as an acceleration: times the mass, with feedforward",
     space=SPACES["mass"],
+    family=Family.PD,
 )
 register(
     "pd-observer",
     partial(PD, reading="observer"),
-    "PD (21) in the place of u_STA in (19), the paper's words to the letter",
+    "the same PD in place of super-twisting, on the paper's observer",
     space=SPACES["observer"],
+    family=Family.PD,
 )
-register("pid", PID, "PID, filtered derivative, anti-windup")
+register("pid", PID, "PID with filtered derivative and anti-windup", family=Family.PD)
 register(
     "ladrc",
     LADRC,
     "linear active-disturbance rejection: extended-state observer and pole placement",
+    family=Family.OBSERVER,
 )
-register("smc", SlidingMode, "sliding mode with boundary layer and integral action")
-register("gsta", GeneralisedSuperTwisting, "generalised super-twisting on the paper's observer")
 register(
-    "agsta", AdaptiveGeneralisedSuperTwisting, "the same with the paper's adaptation of its gains"
+    "smc",
+    SlidingMode,
+    "sliding mode with boundary layer and integral action",
+    family=Family.SLIDING_MODE,
+)
+register(
+    "gsta",
+    GeneralisedSuperTwisting,
+    "generalised super-twisting with constant gains, on the paper's observer",
+    family=Family.SLIDING_MODE,
+)
+register(
+    "agsta",
+    AdaptiveGeneralisedSuperTwisting,
+    "generalised super-twisting whose gains adapt as the paper's do",
+    family=Family.SLIDING_MODE,
 )
 # Laws that estimate the disturbance from the applied force, once more with the lagging force.
 for _id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "ladrc", "smc", "gsta", "agsta"):
@@ -263,6 +292,7 @@ for _id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "ladrc", "smc
         told=LAG,
         space=_law.space,
         on_request=True,
+        family=_law.family,
     )
 # The paper's first case (9), and others with it: position and velocity from the navigator.
 for _id in ("sta", "pd", "pid", "smc"):
@@ -274,65 +304,81 @@ for _id in ("sta", "pd", "pid", "smc"):
         told=NAVIGATED,
         space={name: span for name, span in _law.space.items() if name != "observer_gain"},
         on_request=True,
+        family=_law.family,
     )
 register(
     "dob",
     DisturbanceObserver,
     "disturbance observer: inverse of the nominal model behind a filter, pole placement",
     told=NAVIGATED,
+    family=Family.OBSERVER,
 )
 register(
     "indi",
     Incremental,
-    "incremental nonlinear dynamic inversion: the acceleration's error moves the force",
+    "incremental nonlinear dynamic inversion: the acceleration's error corrects the force",
     told=NAVIGATED,
+    family=Family.OBSERVER,
 )
 register(
     "lqg",
     LQG,
-    "Kalman filter with disturbance, linear-quadratic regulator with the thrusters' lag",
+    "Kalman filter with disturbance, linear-quadratic regulator; joints taken as still",
     told=BODY,
+    family=Family.OPTIMAL,
 )
 register(
     "lqg-joints",
     JointLQG,
-    "the same with the joint motion foreseen by the nominal plant",
+    "lqg that foresees what the joint motion will do",
     told=FORESIGHT,
+    family=Family.OPTIMAL,
 )
 register(
     "adaptive",
     AdaptiveLQG,
-    "the same, with coefficients, current and thruster gains identified on the way",
+    "lqg-joints that identifies coefficients, current and thruster gains on the way",
     told=FORESIGHT,
     on_request=True,
+    family=Family.ADAPTIVE,
 )
 register(
     "informed",
     InformedLQG,
-    "lqg-joints, told what is constant in an episode: what identification could bring",
+    "lqg-joints, told every constant of the episode: all that identification could bring",
     told="all constants of the episode",
     privileged=True,
+    family=Family.REFERENCE,
 )
-register("mpc", MPC, "predictive control on the nominal plant, joint motion known", told=FORESIGHT)
+register(
+    "mpc",
+    MPC,
+    "model-predictive control that foresees the joint motion",
+    told=FORESIGHT,
+    family=Family.OPTIMAL,
+)
 register(
     "mpc-limits",
     LimitedMPC,
-    "the same with the thrusters' limits inside the problem",
+    "mpc that also plans with the thrusters' limits",
     told=FORESIGHT,
     on_request=True,
+    family=Family.OPTIMAL,
 )
 register(
     "oracle",
     Oracle,
-    "the limit: true state, exact plant, the future",
+    "true state, exact plant, the future: the limit",
     told="everything",
     privileged=True,
+    family=Family.REFERENCE,
 )
-register("zero", Zero, "no thrust")
+register("zero", Zero, "no thrust", family=Family.REFERENCE)
 register(
     "heading",
     Heading,
-    "the heading controller that all laws share, and no force",
+    "the heading controller that all laws share, alone",
     space={},
     on_request=True,
+    family=Family.REFERENCE,
 )

@@ -10,6 +10,22 @@ from usm_gym.task.conditions import Conditions, preset_of
 TIERS = ("basin", "sea")
 # The policies with the paper's gains, which meet all conditions.
 PAPER = ("sta", "pd")
+# Of the policies that are meant for `field`, one for every answer to the question which controller
+# to take: learned (what the law believes, and what is added to a law), foreseeing the joints, not
+# foreseeing them, the paper's law with tuned gains, the textbook's, the calmest, and the paper's.
+# The first takes longest to compile.
+SHORT_LIST = (
+    "estimator-lqg-joints",
+    "residual-ppo",
+    "lqg-joints",
+    "mpc",
+    "lqg",
+    "ladrc-lag-tuned",
+    "sta-lag-tuned",
+    "pid",
+    "smc-navigator",
+    *PAPER,
+)
 
 
 def tier_of(conditions: Conditions) -> str:
@@ -34,3 +50,22 @@ def meant_for(conditions: Conditions) -> list[str]:
         return policy.tuned_for == tier or id in PAPER or limit
 
     return [id for id in ids() if meant(id, entry(id))]
+
+
+def short_list(conditions: Conditions) -> list[str]:
+    """Names of the competitors that answer which controller to take under some conditions.
+
+    For a tier they are all that are meant for it, as every law has only one set of gains there.
+    """
+    if tier_of(conditions) not in TIERS:
+        return list(SHORT_LIST)
+    return competitors(conditions)
+
+
+def competitors(conditions: Conditions) -> list[str]:
+    """Names of the competitors that are meant for some conditions.
+
+    Those on request are left out, unless the short list has them.
+    """
+    policies = {id: entry(id) for id in meant_for(conditions) if not entry(id).privileged}
+    return [id for id, each in policies.items() if id in SHORT_LIST or not each.on_request]

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from rich.console import Console
 from support.ball import BallScenario
 from support.episodes import short
 from support.results import PROVENANCE, evaluation, scores
@@ -12,22 +13,41 @@ from usm_baselines.benchmark.leaderboard_page import brief_table, csv_text, mark
 from usm_baselines.benchmark.results import EvaluationResult, MiddleSummary
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult, ScoredPoint
 
-from usm_cli.commands import evaluate
 from usm_cli.commands.robustness import table as robustness_table
 from usm_cli.program import main
+from usm_cli.score_table import table
 
 SCENARIOS = short(4)
 AXES = ("a", "abc")
 axes = pytest.mark.parametrize("axes", AXES)
 
 
+def standing(axes, size):
+    """Return a row of the leaderboard."""
+    row = scores(axes, size, len(SCENARIOS))
+    errors = {
+        f"max_error_{axis}": MiddleSummary(
+            mean=e.mean, ci95=e.ci95, worst=e.worst, iqm=e.mean, iqm_ci95=e.ci95
+        )
+        for axis, e in row.errors.items()
+    }
+    return Standing(
+        metrics={**row.metrics, **errors}, failures=0, per_episode=row.per_episode, competitor=True
+    )
+
+
 @axes
 def test_an_evaluation(axes, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     result = evaluation(axes, ("pd", "sta"), SCENARIOS)
-    headings = [column.header for column in evaluate.table(result).columns]
-    places = [f"{what}{axis}" for what in ("", "worst ", "rms ") for axis in axes]
-    assert headings == ["policy", *places, "variation\nN/s", "objective\nmm", "lost"]
+    rows = {name: standing(axes, 1e-3 * (k + 1)) for k, name in enumerate(("pd", "sta"))}
+    headings = [column.header for column in table(rows, Console(width=400)).columns]
+    joint = " / ".join(axes)
+    assert headings[:3] == ["", "policy", f"error {' + '.join(axes)}\nmm"]
+    assert headings[3:] == [
+        *(f"{axis}\nmm" for axis in axes),
+        *(f"worst\n{joint}", f"rms\n{joint}", "N/s", "objective\nmm", "lost", "told"),
+    ]
     result.write("result.json")
     main(["report", "result.json", "--output", "page.html"])
     text = (tmp_path / "page.html").read_text()
@@ -47,25 +67,10 @@ def test_an_evaluation(axes, tmp_path, monkeypatch, capsys):
 
 @axes
 def test_a_leaderboard(axes, tmp_path):
-    def standing(size):
-        row = scores(axes, size, len(SCENARIOS))
-        errors = {
-            f"max_error_{axis}": MiddleSummary(
-                mean=e.mean, ci95=e.ci95, worst=e.worst, iqm=e.mean, iqm_ci95=e.ci95
-            )
-            for axis, e in row.errors.items()
-        }
-        return Standing(
-            metrics={**row.metrics, **errors},
-            failures=0,
-            per_episode=row.per_episode,
-            competitor=True,
-        )
-
     point = FrontPoint(means={f"max_error_{axis}": 1e-3 for axis in axes} | {"thrust_variation": 9})
     result = LeaderboardResult(
         version="9",
-        suites={MAIN: {"pd": standing(1e-3), "sta": standing(2e-3)}},
+        suites={MAIN: {"pd": standing(axes, 1e-3), "sta": standing(axes, 2e-3)}},
         front={"pd": (point,)},
         refused={},
         provenance=PROVENANCE,

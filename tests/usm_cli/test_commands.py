@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -48,13 +49,26 @@ def small_suite(folder, count=3):
     return path
 
 
-def test_policies_lists_every_policy():
+@pytest.mark.parametrize("width", ["80", "140"])
+def test_policies_lists_every_policy_under_its_family(width):
     import usm_baselines
 
-    answer = usm("policies")
+    answer = usm("policies", env={**os.environ, "COLUMNS": width})
     assert answer.returncode == 0
     assert answer.stderr == ""
-    assert all(id in answer.stdout for id in usm_baselines.ids())
+    assert max(map(len, answer.stdout.splitlines())) <= int(width)
+    listed = re.findall(r"[\w-]+", answer.stdout)
+    assert set(usm_baselines.ids()) <= set(listed)
+    places = [answer.stdout.index(title) for title in ("PD and PID:", "Sliding mode:", "Learned:")]
+    assert places == sorted(places)
+    assert not re.search(r"\(\d+\)", answer.stdout)  # numbers of equations
+
+
+def test_without_a_command_usm_says_what_it_is_for(capsys):
+    main([])
+    said = capsys.readouterr().out
+    assert "usm evaluate" in said
+    assert "usm COMMAND --help" in said
 
 
 @pytest.mark.parametrize("command", [[USM], [USM, "evaluate"], [sys.executable, "-m", "usm_cli"]])
@@ -67,16 +81,21 @@ def test_help_teaches(command):
 def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
     output = tmp_path / "result.json"
     answer = usm(
-        "evaluate", "--policies", "sta,pd", "--suite", small_suite(tmp_path), "--output", output
+        *("evaluate", "--policies", "pd,sta", "--suite", small_suite(tmp_path)),
+        *("--output", output),
+        env={**os.environ, "COLUMNS": "80"},
     )
     assert answer.returncode == 0
     assert answer.stderr == ""  # no progress bar in a pipe
-    assert "sta" in answer.stdout
-    assert "pd" in answer.stdout
+    assert max(map(len, answer.stdout.splitlines())) <= 80
+    assert re.search(r"1= +sta .+\n.+1= +pd ", answer.stdout)
+    said = " ".join(answer.stdout.split())
+    assert "sta is ahead with an error of" in said
+    assert said.endswith("too few to say who wins; 50 are the fewest.")
     data = json.loads(output.read_text())
     assert data["episodes"] == 3
     assert len(data["scenarios"]) == 3
-    assert set(data["results"]) == {"sta", "pd"}
+    assert list(data["results"]) == ["pd", "sta"]
     row = data["results"]["sta"]
     for key in (
         "max_error_x",
@@ -95,7 +114,7 @@ def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
         assert row[key]["ci95"][0] <= row[key]["mean"] <= row[key]["ci95"][1]
     assert row["failures"] == 0
     assert {"version", "commit", "packages", "seeds", "command"} <= set(data["provenance"])
-    assert data["provenance"]["command"].startswith("usm evaluate --policies sta,pd")
+    assert data["provenance"]["command"].startswith("usm evaluate --policies pd,sta")
 
 
 @pytest.mark.slow
@@ -161,7 +180,6 @@ def test_conditions_override_the_suites_own_and_are_marked(tmp_path):
         (["evaluate", "--sweet"], "--sweet"),
         (["evaluate", "--mode", "swim"], "swim"),
         (["swim"], "swim"),
-        ([], "COMMAND"),
     ],
 )
 def test_bad_input_gets_one_line_and_status_2(arguments, message, tmp_path, monkeypatch, capsys):

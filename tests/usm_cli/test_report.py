@@ -197,7 +197,7 @@ def test_code_that_a_file_names_is_not_run(folder, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "No such file"),
+        (None, "No such file: "),
         ("nothing", "is no JSON"),
         ("[1]", "kind of result.json is None; allowed: evaluation, leaderboard"),
         ('{"kind": "poem"}', "kind of result.json is 'poem'; allowed"),

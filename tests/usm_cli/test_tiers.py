@@ -1,19 +1,19 @@
 """By default, conditions of a tier bring their own suite and the policies that are meant for it."""
 
 import json
-import re
+from argparse import Namespace
 from dataclasses import replace
 
 import pytest
 import usm_agents  # noqa: F401 (registers the shipped agents)
 import usm_baselines
-from rich.console import Console
 from support.tiers import register_with_tiers
+from usm_baselines import registry
 
 from usm_cli import selection
-from usm_cli.commands import evaluate, policies
 from usm_cli.program import main
 from usm_gym.suites import suite
+from usm_gym.task.conditions import PRESETS
 
 
 @pytest.fixture
@@ -51,16 +51,36 @@ def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys, monkeypatch):
     assert list(chosen("--suite", "operation-basin")["results"]) == list(data["results"])
 
 
-def test_tables_of_scans_are_readable_on_120_columns(chosen, tmp_path):
+@pytest.mark.parametrize("width", [80, 120])
+def test_tables_of_scans_are_readable(width, chosen, monkeypatch, capsys):
     longest = max((id for id in usm_baselines.ids() if "basin" in id), key=len)
+    monkeypatch.setenv("COLUMNS", str(width))
     chosen("--suite", "operation-basin", "--policies", f"{longest},pd-navigator-basin")
-    result = evaluate.EvaluationResult.read(tmp_path / "result.json")
-    for table in (evaluate.table(result), evaluate.shift_table(result)):
-        console = Console(width=120, highlight=False)
-        with console.capture() as capture:
-            console.print(table)
-        assert longest in capture.get()
-        assert "…" not in capture.get()
+    said = capsys.readouterr().out
+    assert said.count(longest) >= 2
+    assert "…" not in said
+    assert max(map(len, said.splitlines())) <= width
+
+
+def test_the_short_list_has_competitors_and_all_has_them_all():
+    for conditions in (PRESETS["field"], PRESETS["basin"]):
+        everyone = [each.name for each in selection.chosen_contenders("all", conditions)]
+        short = [each.name for each in selection.chosen_contenders(None, conditions)]
+        assert {"sta", "pd"} <= set(short) <= set(everyone)
+        assert not any(registry.entry(id).privileged for id in everyone)
+        more = selection.chosen_contenders("oracle,all,sta", conditions)
+        assert [each.name for each in more] == ["oracle", *everyone]
+
+
+@pytest.mark.parametrize(("policies", "given", "workers"), [(2, None, 1), (40, None, 4), (2, 3, 3)])
+def test_the_cores_are_used_where_there_is_enough_to_do(policies, given, workers, monkeypatch):
+    used = []
+    monkeypatch.setattr(selection, "cpu_count", lambda: 4)
+    monkeypatch.setattr(selection, "score_all", lambda jobs, workers, *rest: used.append(workers))
+    scenarios = suite("operation")
+    jobs = selection.jobs([selection.named("pd")] * policies, scenarios, 1.0)
+    selection.scored(jobs, Namespace(workers=given, cluster=None))
+    assert used == [workers]
 
 
 def test_a_suite_of_ones_own_choice_keeps_its_joint_motion(chosen):
@@ -71,8 +91,9 @@ def test_a_suite_of_ones_own_choice_keeps_its_joint_motion(chosen):
 
 def test_the_list_of_policies_says_for_what_they_are_tuned(tmp_path, monkeypatch, capsys):
     register_with_tiers(monkeypatch, tmp_path, "mine")
-    monkeypatch.setattr(policies, "output_console", lambda: Console(width=200))
     main(["policies"])
     listed = capsys.readouterr().out
+    assert "Others:" in listed
+    assert "also: mine-tuned, mine-basin, mine-sea" in listed
     for gains, tier in (("tuned", "field"), ("basin", "basin"), ("sea", "sea")):
-        assert re.search(rf"mine-{gains} +mine, tuned for {tier} in", listed)
+        assert f"NAME-{gains}: with gains tuned for {tier}" in listed

@@ -161,7 +161,7 @@ def test_a_missing_package_is_named_with_its_extra(module, monkeypatch, capsys):
 def test_without_a_display_a_film_is_asked_for():
     answer = usm("watch", env={**os.environ, "SDL_VIDEODRIVER": "offscreen"})
     assert answer.returncode == 2
-    assert "there is no display" in answer.stderr
+    assert "no display found; add --output run.mp4" in answer.stderr
     assert answer.stderr.count("\n") == 1
 
 

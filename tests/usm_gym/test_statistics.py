@@ -17,6 +17,7 @@ from usm_gym.statistics import (
     interquartile_mean,
     interval,
     ratio_interval,
+    told_apart,
 )
 
 
@@ -24,6 +25,14 @@ def test_an_interval_covers_the_truth_about_as_often_as_it_says() -> None:
     rng = np.random.default_rng(0)
     limits = [interval(np.mean, rng.exponential(size=60)) for _ in range(100)]
     assert 88 <= sum(low <= 1.0 <= high for low, high in limits) <= 99
+
+
+@pytest.mark.parametrize("episodes", [49, 50])
+@pytest.mark.parametrize("lead", [0.0, 0.2, 0.3, 1.0, -1.0])
+def test_two_are_told_apart_where_their_comparison_decides(episodes: int, lead: float) -> None:
+    rng = np.random.default_rng(2)
+    first, second = rng.standard_normal((2, episodes))
+    assert told_apart(first, second + lead) == compare(first, second + lead).decided
 
 
 def test_intervals_have_no_randomness() -> None:

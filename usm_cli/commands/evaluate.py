@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.table import Table
-from usm_baselines.benchmark.leaderboard_page import MARK
-from usm_baselines.benchmark.results import (
-    CompetitorScores,
-    EvaluationResult,
-    attitude_in,
-    lost,
-    medians_in,
-    over_informed,
-    rms_in,
-    shifts_in,
-)
+from usm_baselines.benchmark.leaderboard import ranked
+from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, shifts_in
+from usm_baselines.contender import Contender
 
+from usm_cli.score_table import conclusion, legend, shift_table, table
 from usm_cli.selection import (
     POLICIES,
     add_policies,
@@ -32,25 +25,28 @@ from usm_cli.selection import (
     seeds,
     suite_name,
 )
-from usm_cli.terminal import empty_table, output_console
+from usm_cli.terminal import output_console
+from usm_gym.evaluation import Evaluation
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
-from usm_gym.support.text import degrees, figures, mm
+from usm_gym.task.scenario import Scenario
 
 DESCRIPTION = """\
 Score policies. The score of an episode is the largest true position error after settling (5 s, in
 scans 20 s), in each axis, as in Table 1 of the paper. All policies meet the same scenarios and the
-same noise. Prints means over episodes with 95 % bootstrap intervals; a lost robot counts 0.5 m or
-more in both axes. Where robots are lost, and in scans, medians and shares of lost robots stand
-beside the means; for scans a second table has the errors after the first, third, fifth and last
-shift. Policies that are tuned for `basin` or `sea` are scored there by default and nowhere else,
-and there beside them only the paper's `sta` and `pd`. A policy that fails to act is left out of the
-table and named with the reason; the exit status is then 1.
+same noise. Prints means over episodes, best first, and who wins; the wider the terminal, the more
+columns. A lost robot counts 0.5 m or more in both axes. Where robots are lost, and in scans, a
+table also has medians and shares of lost robots; for scans a second one has the errors after the
+first, third, fifth and last shift. Without --policies, a short list answers which controller to
+take. Under `basin` and `sea` it has all policies that are tuned for them, and beside them only the
+paper's `sta` and `pd`. A policy that fails to act is left out of the table and named with the
+reason; the exit status is then 1.
 """
 EXAMPLES = f"""\
 {POLICIES}
 examples:
-  usm evaluate                                          all competitors, fifty frozen scenarios
+  usm evaluate                                          the short list, fifty frozen scenarios
+  usm evaluate --policies all                           all competitors
   usm evaluate --policies sta,pd --suite torpedo        two of them in torpedo mode
   usm evaluate --policies sta --seed 7 --episodes 200   sampled scenarios
   usm evaluate --conditions ideal                       the suite without noise, lag and current
@@ -87,6 +83,22 @@ def run(arguments: argparse.Namespace) -> None:
     chosen = jobs(contenders, scenarios, arguments.time_limit)
     scores, refused = by_name(chosen, scored(chosen, arguments))
     known = {job.contender.name: job.contender for job in chosen}
+    if arguments.output:
+        write(arguments, scenarios, known, scores, refused)
+    if scores:
+        where = f"{suite_name(arguments) or 'sampled'}, {len(scenarios)} scenarios, best first"
+        show([(known[name], evaluation) for name, evaluation in scores.items()], where)
+    leave_if_refused(refused)
+
+
+def write(
+    arguments: argparse.Namespace,
+    scenarios: Sequence[Scenario],
+    known: Mapping[str, Contender],
+    scores: Mapping[str, Evaluation],
+    refused: Mapping[str, str],
+) -> None:
+    """Write the file of results."""
     result = EvaluationResult(
         suite=suite_name(arguments),
         conditions=scenarios[0].conditions,
@@ -101,67 +113,17 @@ def run(arguments: argparse.Namespace) -> None:
         refused=refused,
         provenance=Provenance.here(seeds(arguments)),
     )
-    if result.results:
-        output_console().print(table(result))
-        if shifts_in(result.results.values()):
-            output_console().print(shift_table(result))
-    if arguments.output:
-        result.write(arguments.output)
-    leave_if_refused(refused)
+    result.write(arguments.output)
 
 
-def table(result: EvaluationResult) -> Table:
-    """The scores for the terminal, errors in mm."""
-    axes, medians = result.axes, medians_in(result.results.values())
-    headings = [*axes]
-    if medians:  # leaves less room
-        headings += [f"{what}\n{' / '.join(axes)}" for what in ("median", "worst")]
-    else:
-        headings += [f"worst {axis}" for axis in axes]
-        headings += [f"rms {axis}" for axis in rms_in(result.results.values())]
-    headings += [f"{angle}\n°" for angle in attitude_in(result.results.values())]
-    ratios = over_informed(result.results)
-    headings += ["over\ninformed"] if ratios else []
-    where = f"{result.suite or 'sampled'}, {result.episodes} episodes"
-    rows = empty_table(
-        "policy",
-        numbers=(*headings, "variation\nN/s", "objective\nmm", "lost"),
-        title=f"largest position error after settling, mm: mean [95 % interval] ({where})",
-    )
-    rows.columns[0].no_wrap = True
-    for name, row in ordered(result):
-        errors = row.errors.values()
-        cells = [f"{mm(e.mean)} [{mm(e.ci95[0])}, {mm(e.ci95[1])}]" for e in errors]
-        worst = [mm(e.worst) for e in errors]
-        if medians:
-            cells += [" / ".join(map(mm, row.medians.values())), " / ".join(worst)]
-        else:
-            cells += [*worst, *(mm(e.mean) for e in row.rms.values())]
-        cells += [degrees(e.mean) for e in row.attitude.values()]
-        cells += [ratios[name]] if ratios else []
-        cells += [figures(row.metrics["thrust_variation"].mean), figures(row.objective)]
-        cells.append(lost(row, bool(medians)))
-        rows.add_row(f"{name} {MARK}" if row.note else name, *cells)
-    notes = {row.note for row in result.results.values() if row.note}
-    rows.caption = "; ".join(f"{MARK} {note}" for note in sorted(notes)) or None
-    return rows
-
-
-def shift_table(result: EvaluationResult) -> Table:
-    """The errors by shift for the terminal, mm."""
-    shifts = shifts_in(result.results.values())
-    axes = " / ".join(result.axes)
-    rows = empty_table(
-        "policy",
-        numbers=shifts,
-        title=f"largest position error from a shift to the next, mm, {axes}, mean",
-    )
-    for name, row in ordered(result):
-        errors = (row.by_shift[shift].values() for shift in shifts)
-        rows.add_row(name, *(" / ".join(mm(e.mean) for e in each) for each in errors))
-    return rows
-
-
-def ordered(result: EvaluationResult) -> list[tuple[str, CompetitorScores]]:
-    """The rows, best first."""
-    return sorted(result.results.items(), key=lambda pair: pair[1].objective)
+def show(scores: Sequence[tuple[Contender, Evaluation]], where: str) -> None:
+    """Print the table, what its columns mean, and who wins."""
+    console = output_console()
+    rows = ranked(scores)
+    console.print(where, markup=False)
+    console.print(table(rows, console))
+    if shifts_in(rows.values()):
+        console.print(shift_table(rows, console))
+    console.print(legend(rows), style="dim", markup=False)
+    objectives = {policy.name: evaluation.objective() for policy, evaluation in scores}
+    console.print(f"\n{conclusion(rows, objectives)}", style="bold", markup=False)

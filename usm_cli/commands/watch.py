@@ -21,7 +21,7 @@ from usm_cli.terminal import empty_table, output_console, progress_bar
 from usm_gym.evaluation import Trajectory, score
 from usm_gym.support.files import check_writable
 from usm_gym.support.text import mm
-from usm_gym.support.validation import require
+from usm_gym.support.validation import UsageError, require
 from usm_gym.task.metrics import MAX_ERROR, axes_of
 
 DESCRIPTION = """\
@@ -78,7 +78,8 @@ def run(arguments: argparse.Namespace) -> None:
         require(medium in film.FPS, "--output", arguments.output, "a file .mp4 or .gif")
         check_writable(path)
     else:
-        require(has_display(), "--output", None, "a file .mp4 or .gif, since there is no display")
+        if not has_display():
+            raise UsageError("no display found; add --output run.mp4")
     contenders = named_contenders(arguments.policies or "sta")
     require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
     scenario = chosen_scenario(arguments)

@@ -8,8 +8,12 @@ from collections.abc import Sequence
 
 def figures(value: float) -> str:
     """Write a number with three significant figures and no exponent."""
-    decimals = 2 - math.floor(math.log10(abs(value))) if value else 2
-    return f"{value:.{min(max(decimals, 0), 6)}f}"
+    return f"{value:.{_decimals(value)}f}"
+
+
+def give_or_take(value: float, margin: float) -> str:
+    """Write a number with three significant figures and its margin to the same decimal."""
+    return f"{figures(value)} ± {margin:.{_decimals(value)}f}"
 
 
 def mm(metres: float) -> str:
@@ -26,3 +30,8 @@ def listed(words: Sequence[str]) -> str:
     """List words as in a sentence: "x", "x and y", "x, y and z"."""
     *most, last = words
     return f"{', '.join(most)} and {last}" if most else last
+
+
+def _decimals(value: float) -> int:
+    decimals = 2 - math.floor(math.log10(abs(value))) if value else 2
+    return min(max(decimals, 0), 6)

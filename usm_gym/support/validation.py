@@ -157,8 +157,9 @@ def in_one_line(error: BaseException) -> str:
     if isinstance(error, ValidationError):
         return _faults(error)
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        said = "No such file" if isinstance(error, FileNotFoundError) else error.strerror
         # Paths are long, and useless without their middle.
-        return f"{error.strerror}: {clipped(str(error.filename), 3 * QUOTED)}"
+        return f"{said}: {clipped(str(error.filename), 3 * QUOTED)}"
     if isinstance(error, KeyError) and error.args:
         return f"{brief(error.args[0])} is missing"
     return clipped(str(error), SAID)

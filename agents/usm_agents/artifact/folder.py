@@ -20,6 +20,7 @@ from pydantic import Field, Strict, TypeAdapter
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 from usm_baselines.contender import Contender, fingerprint
+from usm_baselines.families import Family
 from usm_baselines.gains import Gain
 from usm_baselines.registry import POSITION_ONLY, entry, make, register
 from usm_baselines.tiers import TIERS, tier_of
@@ -265,4 +266,11 @@ def register_shipped() -> None:
         factory = partial(make_agent, folder=str(folder))
         told = told_with(agent["base"])
         tuned_for = made_for(agent["conditions"])
-        register(folder.name, factory, agent["summary"], told=told, tuned_for=tuned_for)
+        register(
+            folder.name,
+            factory,
+            agent["summary"],
+            told=told,
+            tuned_for=tuned_for,
+            family=Family.LEARNED,
+        )

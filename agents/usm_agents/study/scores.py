@@ -81,7 +81,7 @@ def jobs(
 
 
 def score(
-    planned: Mapping[Key, Job], workers: int, cache: Path, progress: Callable[[int], object]
+    planned: Mapping[Key, Job], workers: int, cache: Path, progress: Callable[[float], object]
 ) -> dict[Key, Evaluation | Refusal]:
     """Score policies.
 

@@ -18,7 +18,7 @@ from usm_baselines.contender import Contender, contender
 from usm_baselines.gains import FOLDERS, FRONT, read_gains
 from usm_baselines.tiers import PAPER, meant_for
 from usm_gym.evaluation import Evaluation
-from usm_gym.statistics import compare, interquartile_mean, interval
+from usm_gym.statistics import compare, interquartile_mean, interval, told_apart
 from usm_gym.suites import NAMES, suite
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
@@ -272,11 +272,12 @@ def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing
 def ranks(order: Sequence[Evaluation]) -> list[int | None]:
     """The ranks of rows, best first: see `Standing.rank`."""
     places: list[int | None] = []
-    for index, scores in enumerate(order):
+    objectives = [scores.objective() for scores in order]
+    for index, scores in enumerate(objectives):
         tied = (
             place
-            for place, better in enumerate(order[:index])
-            if not compare(better.objective(), scores.objective()).decided
+            for place, better in enumerate(objectives[:index])
+            if not told_apart(better, scores)
         )
         places.append(next(tied, index) + 1)
     return places

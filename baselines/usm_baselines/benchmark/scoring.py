@@ -13,8 +13,9 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
@@ -36,6 +37,7 @@ from usm_gym.evaluation import (
 from usm_gym.policy import Policy, is_privileged, nominal_of
 from usm_gym.support import parallel
 from usm_gym.support.files import read_json, write_json
+from usm_gym.support.relay import relayed
 from usm_gym.support.validation import (
     CONFIG,
     Number,
@@ -113,7 +115,7 @@ def score_all(
     jobs: Sequence[Job],
     workers: int = 1,
     cache: Path | None = None,
-    progress: Callable[[int], object] = lambda episodes: None,
+    progress: Callable[[float], object] = lambda episodes: None,
     batch: int = BATCH,
 ) -> list[Evaluation | Refusal]:
     """Score every job.
@@ -124,7 +126,8 @@ def score_all(
         cache: Folder in which the scores of a job are looked for, and kept when it is done; there
             are none of refused policies, nor of those whose code is not known. A file that is
             damaged is written anew, after a warning.
-        progress: Called with the number of episodes done since the last call.
+        progress: Called now and then with the number of episodes done since the last call, also
+            with fractions of them, and from another thread; it adds up to all episodes.
         batch: How many episodes are run side by side at most; without effect on the result.
 
     Returns:
@@ -145,26 +148,50 @@ def score_all(
         tasks += [(job, part) for part in parts]
         places += [(index, place) for place in range(len(parts))]
         waiting[index] = [None] * len(parts)
-    for number, outcome in parallel.results(score_batch, tasks, workers):
-        job, part = tasks[number]
-        index, place = places[number]
-        waiting[index][place] = outcome
-        progress(len(job.scenarios[part]))
-        done = [each for each in waiting[index] if each is not None]
-        if len(done) == len(waiting[index]):
-            outcomes[index] = _whole(done)
-            _write(cache, job, outcomes[index])
+    done = _Done([len(job.scenarios[part]) for job, part in tasks], progress)
+    with relayed(done.add) if workers > 1 else nullcontext(done.add) as tell:
+        calls = [(*task, partial(tell, number)) for number, task in enumerate(tasks)]
+        for number, outcome in parallel.results(score_batch, calls, workers):
+            index, place = places[number]
+            waiting[index][place] = outcome
+            done.finish(number)
+            parts_done = [each for each in waiting[index] if each is not None]
+            if len(parts_done) == len(waiting[index]):
+                outcomes[index] = _whole(parts_done)
+                _write(cache, jobs[index], outcomes[index])
     return [outcomes[index] for index in range(len(jobs))]
 
 
-def score_batch(job: Job, part: slice) -> Evaluation | Refusal:
-    """Score a part of the episodes of a job side by side."""
+class _Done:
+    """How much of each task is done, and who wants to know."""
+
+    def __init__(self, sizes: Sequence[float], progress: Callable[[float], object]) -> None:
+        """Begin with tasks of these sizes."""
+        self._left, self._progress = list(sizes), progress
+        self._lock = threading.Lock()
+
+    def add(self, task: int, amount: float) -> None:
+        """Take note of a part of a task; what comes after its end counts no more."""
+        with self._lock:
+            amount = min(amount, self._left[task])
+            self._left[task] -= amount
+            self._progress(amount)
+
+    def finish(self, task: int) -> None:
+        """Take note of the end of a task."""
+        self.add(task, self._left[task])
+
+
+def score_batch(
+    job: Job, part: slice, progress: Callable[[float], None] | None = None
+) -> Evaluation | Refusal:
+    """Score a part of the episodes of a job side by side; `progress` as for `evaluate`."""
     scenarios = job.scenarios[part]
     try:
         policy = job.contender.make(job.nominal)
         if job.contender.identity is None:  # ours are never refused for a slow machine
             policy = Timed(policy, job.time_limit)
-        return evaluate(policy, scenarios)
+        return evaluate(policy, scenarios, progress=progress)
     except job.contender.refusals as error:
         kind = "" if isinstance(error, ValueError | TimeoutError) else f"{type(error).__name__}: "
         return Refusal(kind + in_one_line(error))

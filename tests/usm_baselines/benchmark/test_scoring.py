@@ -127,7 +127,7 @@ def test_an_unstable_controller_loses_the_robot_and_is_scored() -> None:
 
 def test_scores_are_those_of_evaluate_however_they_are_computed() -> None:
     expected = usm_gym.evaluate(contender("sta").make(job().nominal), SCENARIOS)
-    episodes: list[int] = []
+    episodes: list[float] = []
     for workers in (1, 2):
         jobs = [job("sta"), job("sta", SCENARIOS[::-1])]
         one, turned = score_all(jobs, workers, progress=episodes.append, batch=2)
@@ -135,7 +135,17 @@ def test_scores_are_those_of_evaluate_however_they_are_computed() -> None:
         assert isinstance(turned, Evaluation)
         for name, values in turned.per_episode.items():
             assert np.array_equal(values[::-1], expected.per_episode[name])
-    assert sum(episodes) == 12
+    assert sum(episodes) == pytest.approx(12)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_progress_moves_within_a_policy_and_adds_up_although_one_is_refused(workers: int) -> None:
+    chosen = tuple(short(2, duration=8.0))
+    episodes: list[float] = []
+    score_all([job("sta", chosen), job(Raising, chosen)], workers, progress=episodes.append)
+    assert sum(episodes) == pytest.approx(4)
+    assert min(episodes) >= 0.0
+    assert sum(0.0 < each < 2.0 for each in episodes) >= 3
 
 
 def test_what_is_kept_is_not_computed_again(
@@ -146,7 +156,7 @@ def test_what_is_kept_is_not_computed_again(
     score_all(jobs, cache=tmp_path)
     assert len(list(tmp_path.iterdir())) == 1  # neither other people's code nor a refusal
     monkeypatch.setattr(scoring, "score_batch", None)
-    episodes: list[int] = []
+    episodes: list[float] = []
     (again,) = score_all(jobs[:1], cache=tmp_path, progress=episodes.append)
     assert_same(again, first[0])
     assert episodes == [3]
