@@ -172,8 +172,7 @@ class Comparison:
         bar = None if row else np.array([MARGIN + 10 + GRID * METRE, top + WATERS - 6.0])
         self._scenes[row].draw(self._frame, picture, colour, bar)
         if bar is not None:
-            middle = (bar[0] - GRID * METRE / 2, bar[1] - 17)
-            self._text(f"{GRID:g} m", middle, SMALL, GREY, MIDDLE)
+            self._text(f"{GRID:g} m", (bar[0] + 5, bar[1] - 12), SMALL, GREY)
         lens.draw(self._frame, picture, self._ring, colour)
         magnified = float(f"{lens.reach / self._ring / METRE:.2g}")
         self._text(f"error × {magnified:g}", (LENS[0], top + 101), SMALL, GREY, MIDDLE)
@@ -198,7 +197,7 @@ class Comparison:
         self._text(words, (MARGIN, self._foot + 1), SMALL, GREY)
         self._text(f"{1e3 * self._scale:g}", (area.left - 5, area.top - 5), SMALL, GREY, RIGHT)
         self._text("0", (area.left - 5, area.bottom - 10), SMALL, GREY, RIGHT)
-        for mark in np.linspace(0.0, scenario.duration, 4):
+        for mark in np.linspace(0.0, scenario.duration, 5):
             x = area.left + area.width * mark / scenario.duration
             align = MIDDLE if mark < scenario.duration else RIGHT
             self._text(f"{mark:g} s", (x, area.bottom + 4), SMALL, GREY, align)

@@ -36,7 +36,7 @@ GRID = 0.5
 JET_LENGTH = 0.36
 # The water's arrows: their distance in a row, m, and how long and how far they may be drawn, s, m.
 SPACING, SECONDS, LONGEST = 0.5, 8.0, 0.3
-STREAM, OUTLINE = faded(CURRENT, 0.45), faded(REFERENCE, 0.6)
+STREAM, OUTLINE = faded(CURRENT, 0.45), faded(REFERENCE, 0.45)
 # How much of the past a lens shows, s.
 LENS_PAST = 2.0
 
