@@ -28,14 +28,14 @@ from usm_gym.rendering.look import (
     outlines,
 )
 from usm_gym.rendering.panel import Panel
-from usm_gym.rendering.picture import Picture
-from usm_gym.task.water import Water
+from usm_gym.rendering.picture import Picture, drift
 
 GRID = 0.5
 # Length of a jet at the thruster's limit, m.
 JET_LENGTH = 0.36
-# The water's arrows: their distance in a row, m, and how long and how far they may be drawn, s, m.
-SPACING, SECONDS, LONGEST = 0.5, 8.0, 0.3
+# The water's arrows: their distance in a row and that of the rows, m; how far the water moves along
+# an arrow, s, and the longest arrow, m.
+SPACING, SECONDS, LONGEST = np.array([0.6, 0.33]), 8.0, 0.3
 STREAM, OUTLINE = faded(CURRENT, 0.45), faded(REFERENCE, 0.45)
 # How much of the past a lens shows, s.
 LENS_PAST = 2.0
@@ -196,18 +196,6 @@ class Lens:
         arrow(self._panel, self._middle, points[-1], 2.2, colour)
         self._panel.centre_of_mass(points[-1])
         self._panel.show(frame)
-
-
-def drift(water: Water, time: float) -> Points:
-    """How far the water has moved since the start, m, (2,): its velocity, integrated."""
-    moved = np.array(water.current) * time
-    waves = [(water.amplitude, water.phase, water.period)]
-    waves += [(wave.amplitude, (wave.phase, wave.phase), wave.period) for wave in water.waves]
-    for amplitude, phase, period in waves:
-        frequency = 2 * np.pi / period
-        swing = np.cos(phase) - np.cos(np.add(phase, frequency * time))
-        moved += np.array(amplitude) * swing / frequency
-    return moved
 
 
 def cross_hair(panel: Panel, at: Points, size: float = 1.0) -> None:

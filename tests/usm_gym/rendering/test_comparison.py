@@ -14,8 +14,7 @@ from usm_gym.rendering.comparison import (
     scored_distances,
 )
 from usm_gym.rendering.look import HEAD, WATER
-from usm_gym.rendering.picture import Recorder
-from usm_gym.rendering.scene import drift
+from usm_gym.rendering.picture import Recorder, drift, velocity
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.water import Water
@@ -62,6 +61,8 @@ def test_the_water_drifts_as_fast_as_the_simulations():
         velocities.append(simulation.read("water_velocity")[0])
     period = scenario.conditions.control_period
     times = period * np.arange(1, len(velocities) + 1)
+    told = [velocity(scenario.water, time) for time in times]
+    np.testing.assert_allclose(told, velocities, atol=1e-3)
     moved = np.array([drift(scenario.water, time) for time in times])
     speeds = np.gradient(moved, period, axis=0)
     np.testing.assert_allclose(speeds[1:-1], np.array(velocities)[1:-1], atol=1e-3)
