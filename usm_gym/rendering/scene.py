@@ -120,8 +120,8 @@ class Scene:
         places = np.stack([across + 0.5 * (up % 2), up], axis=1) * SPACING + moved
         reach = min(LONGEST, SECONDS * speed) * picture.current / speed
         for place in places:
-            ends = self._at(np.stack([place - reach / 2, place + reach / 2]))
-            arrow(self._panel, *ends, 1.2, STREAM)
+            start, tip = self._at(np.stack([place - reach / 2, place + reach / 2]))
+            arrow(self._panel, start, tip, 1.2, STREAM)
 
     def _body(self, picture: Picture) -> None:
         links = self._at(outlines(picture.robot, picture.body))
@@ -170,8 +170,8 @@ class Lens:
 
     def __init__(self, middle: Points, radius: float, unit: float, ground: Colour = PAPER) -> None:
         """Prepare a view around a point, in points of `unit` pixels, on ground of a colour."""
-        corner, side = np.floor(middle - radius - 2), np.ceil(2 * radius + 4)
-        self._panel = panel = Panel(pygame.Rect(*corner, side, side), unit, ground)
+        (left, top), side = np.floor(middle - radius - 2).tolist(), 2 * radius + 4
+        self._panel = panel = Panel(pygame.Rect(left, top, side, side), unit, ground)
         self._middle = middle
         self.reach = 0.84 * radius
         panel.disc(middle, radius + 1.2, RULE)
