@@ -1,4 +1,4 @@
-"""Shows policies side by side, as a film or in a window (needs the extra `render`)."""
+"""Shows policies, one above the other, as a film or in a window (needs the extra `render`)."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ import numpy as np
 
 from usm_cli.take import Take
 from usm_gym.rendering.canvas import Canvas, Frame, error_scale
+from usm_gym.rendering.comparison import Caption, Comparison
 from usm_gym.rendering.window import Window
 from usm_gym.support.files import replacing
 
 # It warns of films that Ctrl-C ends before their first frame, but those are removed anyway.
 logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
 
-# Frames per second of a medium, and the width of a policy's frame, alone and beside another one.
+# Frames per second of a medium, and the width of a frame with one policy and with several.
 # The times of a GIF are multiples of 0.01 s, and GIFs become large quickly.
 FPS = {".mp4": 25.0, ".gif": 12.5, "window": 50.0}
-WIDTHS = {".mp4": (960, 640), ".gif": (640, 480), "window": (960, 640)}
+WIDTHS = {".mp4": (960, 720), ".gif": (640, 560), "window": (960, 480)}
 # A GIF has one palette, so that a frame holds only its differences from the one before. The palette
 # comes from a few frames that are sent ahead; otherwise the encoder would keep the whole film.
 AHEAD = 8
@@ -35,29 +36,47 @@ GIF = (
 
 
 class Film:
-    """Takes of the same scenario side by side, with one scale for their errors.
+    """Takes of the same scenario, one above the other, with one scale for their errors.
 
     Attributes:
         size: Width and height of a frame.
         length: Number of frames.
     """
 
-    def __init__(self, takes: Sequence[Take], length: int, width: int) -> None:
-        """Cut a film of `length` frames, in which a take is `width` pixels wide."""
-        self._takes = takes
-        self._canvases = [Canvas(width) for _ in takes]
-        self._scale = max(error_scale(take.pictures[-1].errors) for take in takes)
-        height = self._canvases[0].size[1]
-        self.size = (width * len(takes), height)
+    def __init__(
+        self,
+        takes: Sequence[Take],
+        names: Sequence[str],
+        length: int,
+        width: int,
+        speed: float = 1.0,
+    ) -> None:
+        """Cut a film.
+
+        Args:
+            takes: One to three takes.
+            names: What to call them.
+            length: Number of frames.
+            width: Of a frame, pixels.
+            speed: Of the film, times real time.
+        """
+        self._takes, self._name = takes, names[0]
+        self._canvas: Canvas | Comparison
+        last = [take.pictures[-1] for take in takes]
+        if len(takes) == 1:
+            self._canvas, self._scale = Canvas(width), error_scale(last[0].errors)
+        else:
+            captions = [Caption(name, take.told) for name, take in zip(names, takes, strict=True)]
+            self._canvas = Comparison(width, captions, last, speed)
+        self.size = self._canvas.size
         self.length = length
 
     def frame(self, index: int) -> Frame:
         """Draw a frame."""
-        drawn = [
-            canvas.draw(take.pictures[min(index, len(take.pictures) - 1)], take.name, self._scale)
-            for canvas, take in zip(self._canvases, self._takes, strict=True)
-        ]
-        return drawn[0] if len(drawn) == 1 else np.concatenate(drawn, axis=1)
+        pictures = [take.pictures[min(index, len(take.pictures) - 1)] for take in self._takes]
+        if isinstance(self._canvas, Comparison):
+            return self._canvas.draw(pictures)
+        return self._canvas.draw(pictures[0], self._name, self._scale)
 
 
 def write(
@@ -75,7 +94,7 @@ def write(
         options |= {"quality": None, "macro_block_size": 1}
         ahead = np.linspace(0, film.length - 1, AHEAD).astype(int).tolist()
     else:
-        options = {"codec": "libx264", "quality": 6}
+        options = {"codec": "libx264", "quality": 6, "macro_block_size": 2}
         options |= {"output_params": ["-preset", "veryfast", "-movflags", "+faststart"]}
     with replacing(path) as part:
         try:

@@ -21,11 +21,13 @@ class Take:
 
     Attributes:
         name: The policy's name.
+        told: What it is told besides the measured position and the reference; empty if unknown.
         pictures: One per frame, or fewer if the robot was lost, which the last one then shows.
         trajectory: The episode.
     """
 
     name: str
+    told: str
     pictures: list[Picture]
     trajectory: Trajectory
 
@@ -76,4 +78,4 @@ def take(
         raise UsageError(f"{contender.name} is refused: {kind}{in_one_line(error)}") from error
     end = max(seen)
     pictures = [seen[count] for count in shown if count < end] + [seen[end]]
-    return Take(contender.name, pictures, trajectory)
+    return Take(contender.name, contender.told, pictures, trajectory)

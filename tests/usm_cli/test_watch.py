@@ -62,7 +62,7 @@ def probe(path):
 @pytest.mark.parametrize(
     ("suffix", "policies", "speed", "size", "fps", "frames"),
     [
-        (".mp4", "sta,pd", 1, (1280, 480), 25, 51),
+        (".mp4", "sta,pd", 1, (720, 804), 25, 51),
         (".mp4", "sta", 4, (960, 720), 25, 13),
         (".gif", "sta", 1, (640, 480), 12.5, 26),
     ],
@@ -110,7 +110,7 @@ def test_a_lost_robot_keeps_its_last_picture():
     assert lost.trajectory.lost
     assert lost.pictures[-1].lost
     assert not any(each.lost for each in lost.pictures[:-1])
-    made = film.Film([lost], len(shown), 320)
+    made = film.Film([lost], ["zero"], len(shown), 320)
     assert (made.frame(len(lost.pictures) - 1) == made.frame(len(shown) - 1)).all()
 
 
@@ -121,7 +121,11 @@ def test_a_lost_robot_keeps_its_last_picture():
         (["--speed", "inf"], "--speed is inf"),
         (["--output", "run.avi"], "--output is 'run.avi'; allowed: a file .mp4 or .gif"),
         (["--output", "missing/run.mp4"], "no directory missing"),
-        (["--policies", "sta,pd,zero", "--output", "run.mp4"], "allowed: one name or two"),
+        (
+            ["--policies", "sta,pd,zero,heading", "--output", "run.mp4"],
+            "allowed: one to three names",
+        ),
+        (["--policies", "sta,pd", "--names", "A,", "--output", "run.mp4"], "allowed: 2 names"),
         (["--policies", "nobody", "--output", "run.mp4"], "policy is 'nobody'"),
         (["--scenario", "50", "--output", "run.mp4"], "--scenario is 50; allowed: 0 to 49"),
         (["--scenario", "-1", "--output", "run.mp4"], "--scenario is -1"),
@@ -234,7 +238,7 @@ def test_a_full_disk_leaves_one_line_and_no_file(output):
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
     try:
         with pytest.raises(OSError, match="cannot write") as caught:
-            film.write(film.Film([taken], 51, 640), output, 25.0)
+            film.write(film.Film([taken], ["sta"], 51, 640), output, 25.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert "\n" not in str(caught.value)

@@ -25,16 +25,16 @@ from usm_gym.support.validation import UsageError, require
 from usm_gym.task.metrics import MAX_ERROR, axes_of
 
 DESCRIPTION = """\
-Watch a policy in an episode, or two side by side in the same scenario with the same noise, in a
-window (Escape closes it) or in a film. The picture shows the robot and its reference posture, the
-jets of its thrusters, the track of its centre of mass, and its error, magnified and over time.
-Needs the extra `render`.
+Watch a policy in an episode, or two or three, one above the other, in the same scenario with the
+same noise, in a window (Escape closes it) or in a film. The picture shows the robot and the shape
+that it shall have, the jets of its thrusters, the current, the centre of mass and its goal, and the
+error, magnified and over time. Needs the extra `render`.
 """
 EXAMPLES = f"""\
 {POLICIES}
 examples:
   usm watch                                     the super-twisting controller in a window
-  usm watch --policies pd,sta                   two policies side by side
+  usm watch --policies pd,sta                   two policies, one above the other
   usm watch --policies sta --output run.mp4     a film; run.gif for a page that shows no films
   usm watch --suite torpedo --scenario 7        another episode
   usm watch --seed 3 --speed 4                  a sampled episode at four times real time
@@ -59,6 +59,11 @@ def add_to(subparsers: Any) -> None:
         metavar="X",
         help="speed of the film, times real time (default: 1)",
     )
+    add(
+        "--names",
+        metavar="A,B",
+        help="what to call the policies on the picture, in their order (default: as --policies)",
+    )
     add("--output", metavar="FILE", help="write a film, .mp4 or .gif, instead of showing it")
     parser.set_defaults(run=run)
 
@@ -81,7 +86,8 @@ def run(arguments: argparse.Namespace) -> None:
         if not has_display():
             raise UsageError("no display found; add --output run.mp4")
     contenders = named_contenders(arguments.policies or "sta")
-    require(len(contenders) <= 2, "--policies", arguments.policies, "one name or two")
+    require(len(contenders) <= 3, "--policies", arguments.policies, "one to three names")
+    names = shown_names(arguments.names, [contender.name for contender in contenders])
     scenario = chosen_scenario(arguments)
     fps = film.FPS[medium]
     shown = instants(scenario, fps, speed)
@@ -91,13 +97,22 @@ def run(arguments: argparse.Namespace) -> None:
             take(contender, scenario, shown, lambda episodes: bar.advance(line, episodes))
             for contender in contenders
         ]
-        made = film.Film(takes, len(shown), film.WIDTHS[medium][len(takes) - 1])
+        made = film.Film(takes, names, len(shown), film.WIDTHS[medium][len(takes) > 1], speed)
         if path:
             line = bar.add_task("draw", total=made.length)
             film.write(made, path, fps, lambda frames: bar.advance(line, frames))
     if not path:
         film.play(made, fps)
     output_console().print(table({shot.name: shot.trajectory for shot in takes}))
+
+
+def shown_names(given: str | None, ids: list[str]) -> list[str]:
+    """What the policies are called on the picture: `--names`, or else their ids."""
+    if given is None:
+        return ids
+    names = [name.strip() for name in given.split(",")]
+    require(all(names) and len(names) == len(ids), "--names", given, f"{len(ids)} names")
+    return names
 
 
 def table(trajectories: dict[str, Trajectory]) -> Table:

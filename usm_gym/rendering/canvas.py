@@ -8,31 +8,34 @@ from numpy.typing import NDArray
 
 from usm_gym.rendering.look import (
     ALARM,
-    BODY,
-    BODY_EDGE,
     CURRENT,
     ERROR_COLOURS,
-    FAINT,
     GREY,
     HEAD,
     HEAD_EDGE,
     HEAD_LINK,
     INK,
-    JET,
-    JET_CORE,
     LINK,
     PAPER,
-    REFERENCE,
     RULE,
-    TAIL,
     TRAIL,
     WATER,
     Colour,
     Points,
-    outlines,
 )
 from usm_gym.rendering.panel import LEFT, MIDDLE, RIGHT, Panel, write
 from usm_gym.rendering.picture import Picture
+from usm_gym.rendering.scene import (
+    GRID,
+    JET_LENGTH,
+    OUTLINE,
+    Lens,
+    Scene,
+    arrow,
+    cross_hair,
+    draw_jet,
+    thinned,
+)
 from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.scenario import Scenario
 
@@ -43,17 +46,11 @@ WIDTH, HEIGHT = 640, 480
 SCENE = pygame.Rect(14, 52, 612, 262)
 LEGEND = 328
 CAPTIONS = 348
-LENS, LENS_RADIUS, LENS_REACH = (66.0, 416.0), 50.0, 42.0
-LENS_AREA = pygame.Rect(14, 364, 104, 104)
+LENS, LENS_RADIUS = (66.0, 416.0), 50.0
 CHART = pygame.Rect(196, 368, 420, 88)
 CHART_AREA = CHART.inflate(8, 8)
 METRE = 220.0
-GRID = 0.5
 ARROW, ARROW_AREA = np.array([615.0, 40.0]), pygame.Rect(602, 28, 26, 24)
-# Length of a jet at the thruster's limit, m.
-JET_LENGTH = 0.36
-# How much of the past the lens shows, s.
-LENS_PAST = 2.0
 SCALES = tuple(digit * 10.0**power for power in (-4, -3, -2, -1, 0) for digit in (1, 2, 5))
 
 
@@ -71,10 +68,9 @@ class Canvas:
         self._unit = width / WIDTH
         self.size = (width, round(HEIGHT * self._unit))
         self._frame = pygame.Surface(self.size)
-        self._scene = Panel(SCENE, self._unit, WATER)
+        self._scene = Scene(SCENE, self._unit, METRE, np.array(SCENE.center))
+        self._lens = Lens(np.array(LENS), LENS_RADIUS, self._unit)
         self._arrow = Panel(ARROW_AREA, self._unit)
-        self._path: Points | None = None
-        self._dots = np.empty((0, 2))
         self._episode: tuple[Scenario, float] | None = None
 
     def draw(self, picture: Picture, title: str, scale: float | None = None) -> Frame:
@@ -95,7 +91,7 @@ class Canvas:
         self._frame.blit(self._still, (0, 0))
         self._headline(picture, title)
         self._swimming(picture)
-        self._error_in_lens(picture, scale)
+        self._lens.draw(self._frame, picture, scale)
         self._curves(picture, scale)
         pixels = np.empty((self.size[1], self.size[0], 3), np.uint8)
         pygame.image.frombuffer(pixels.data, self.size, "RGB").blit(self._frame, (0, 0))
@@ -105,7 +101,7 @@ class Canvas:
         """Draw what all frames of an episode share."""
         self._frame.fill(PAPER)
         self._legend(scenario)
-        self._empty_lens(scale)
+        self._lens_words(scale)
         self._empty_chart(scenario, scale)
         self._still = self._frame.copy()
 
@@ -130,109 +126,22 @@ class Canvas:
             self._text("still water", (626, 31), 12, GREY, RIGHT)
             return
         self._text(f"current {100 * speed:.1f} cm/s", (600, 31), 12, GREY, RIGHT)
-        ahead = current * (1, -1) / speed
-        across = np.array([-ahead[1], ahead[0]])
-        tip, neck = ARROW + 10 * ahead, ARROW + ahead
+        ahead = 10 * current * (1, -1) / speed
         self._arrow.clear()
-        self._arrow.line(np.stack([ARROW - 10 * ahead, neck]), 2.0, CURRENT)
-        head = np.stack([tip, neck + 4.5 * across, neck - 4.5 * across])
-        self._arrow.shape(head, CURRENT, CURRENT)
+        arrow(self._arrow, ARROW - ahead, ARROW + ahead, 2.2, CURRENT)
         self._arrow.show(self._frame)
 
     def _swimming(self, picture: Picture) -> None:
         """Draw the robot and its path."""
-        scene = self._scene
-        scene.clear()
-        self._centre = picture.path[picture.instants[-1]]
-        self._grid()
-        for points in self._in_scene(outlines(picture.robot, picture.reference)):
-            scene.outline(points, 1.5, REFERENCE)
-        self._jets(picture)
-        self._body(picture)
-        scene.disc(self._in_scene(self._path_dots(picture.path)), 1.3, INK)
-        trail = picture.path[picture.instants] + picture.errors
-        scene.line(self._in_scene(_thinned(trail, 500)), 2.2, TRAIL)
-        scene.centre_of_mass(self._in_scene(trail[-1]))
-        right, bottom = SCENE.right - 14.0, SCENE.bottom - 8.0
-        bar = np.array([[right - GRID * METRE, bottom], [right, bottom]])
-        scene.line(bar, 1.5, GREY)
-        scene.show(self._frame)
-        self._text(f"{GRID:g} m", (bar[:, 0].mean(), bottom - 15), 10, GREY, MIDDLE)
+        bar = np.array([SCENE.right - 14.0, SCENE.bottom - 8.0])
+        self._scene.draw(self._frame, picture, bar=bar)
+        middle = bar[0] - GRID * METRE / 2
+        self._text(f"{GRID:g} m", (middle, bar[1] - 15), 10, GREY, MIDDLE)
 
-    def _grid(self) -> None:
-        half = np.array(SCENE.size) / (2 * METRE)
-        low, high = self._centre - half, self._centre + half
-        for axis in (0, 1):
-            marks = np.arange(np.ceil(low[axis] / GRID) * GRID, high[axis], GRID)
-            lines = np.tile(np.stack([low, high]), (len(marks), 1, 1))
-            lines[..., axis] = marks[:, np.newaxis]
-            for ends in self._in_scene(lines):
-                self._scene.line(ends, 0.8, FAINT)
-
-    def _body(self, picture: Picture) -> None:
-        links = self._in_scene(outlines(picture.robot, picture.body))
-        centres = self._in_scene(picture.body.centres)
-        self._scene.disc((centres[:-1] + centres[1:]) / 2, 6.0, BODY_EDGE)
-        for points in links:
-            self._scene.shape(points, BODY, BODY_EDGE)
-        self._scene.shape(links[0], TAIL, BODY_EDGE)
-        self._scene.shape(links[-1], HEAD, HEAD_EDGE)
-        self._scene.disc(centres[-1] + 0.45 * (centres[-1] - centres[-2]), 3.0, HEAD_EDGE)
-
-    def _jets(self, picture: Picture) -> None:
-        """Draw the water that leaves a thruster, against its force and beside the body."""
-        robot, body = picture.robot, picture.body
-        for link, normal, thrust in zip(
-            robot.thruster_links, robot.thruster_is_normal, picture.thrust, strict=True
-        ):
-            angle = body.angles[link]
-            tangent = np.array([np.cos(angle), np.sin(angle)])
-            left = np.array([-tangent[1], tangent[0]])
-            flow = -thrust * (left if normal else tangent)
-            for side in (-np.sign(thrust),) if normal else (-1.0, 1.0):
-                start = body.centres[link] + 0.9 * side * robot.half_width * left
-                breadth = 1.0 if normal else 0.6
-                _draw_jet(self._scene, self._in_scene(start), flow * (1, -1), breadth)
-
-    def _path_dots(self, path: Points) -> Points:
-        """Points on a path every 4 cm, computed again only for another path."""
-        if path is not self._path:
-            self._path = path
-            length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-            places = np.arange(0.0, length[-1], 0.04)
-            self._dots = np.stack([np.interp(places, length, path[:, k]) for k in (0, 1)], axis=1)
-        seen = np.abs(self._dots - self._centre).max(axis=1, initial=0.0) < WIDTH / (2 * METRE)
-        return np.asarray(self._dots[seen])
-
-    def _in_scene(self, points: Points) -> Points:
-        return np.asarray(SCENE.center + (points - self._centre) * (METRE, -METRE))
-
-    def _empty_lens(self, scale: float) -> None:
-        magnification = float(f"{LENS_REACH / scale / METRE:.2g}")
+    def _lens_words(self, scale: float) -> None:
+        magnification = float(f"{self._lens.reach / scale / METRE:.2g}")
         self._text(f"error, {magnification:g} times as large", (14, CAPTIONS), 10, GREY)
         self._text(_limit(scale), (LENS[0] + LENS_RADIUS + 4, LENS[1] - 7), 10, GREY)
-        middle = np.array(LENS)
-        lens = self._lens = Panel(LENS_AREA, self._unit)
-        lens.disc(middle, LENS_RADIUS + 1.2, RULE)
-        lens.disc(middle, LENS_RADIUS, WATER)
-        for share in (1.0, 0.5):
-            lens.disc(middle, share * LENS_REACH + 0.5, RULE)
-            lens.disc(middle, share * LENS_REACH - 0.5, WATER)
-        for arm in ((LENS_REACH, 0.0), (0.0, LENS_REACH)):
-            lens.line(np.stack([middle - arm, middle + arm]), 0.8, RULE)
-        lens.keep()
-
-    def _error_in_lens(self, picture: Picture, scale: float) -> None:
-        """The error of the centre of mass, magnified; the reference is in the middle."""
-        past = round(LENS_PAST / picture.scenario.conditions.control_period)
-        marks = picture.errors[-past:] / scale
-        marks /= np.maximum(np.hypot(*marks.T), 1.0)[:, np.newaxis]
-        points = np.array(LENS) + LENS_REACH * marks * (1, -1)
-        self._lens.clear()
-        self._lens.line(_thinned(points), 1.2, TRAIL)
-        self._lens.disc(np.array(LENS), 2.5, REFERENCE)
-        self._lens.centre_of_mass(points[-1])
-        self._lens.show(self._frame)
 
     def _empty_chart(self, scenario: Scenario, scale: float) -> None:
         x = self._text("error of the centre of mass:", (CHART.left, CAPTIONS), 10, GREY)
@@ -263,7 +172,7 @@ class Canvas:
         for axis, colour in enumerate(ERROR_COLOURS):
             across = CHART.left + CHART.width * time / scenario.duration
             curve = np.stack([across, CHART.centery - heights[:, axis]], axis=1)
-            self._chart.line(_thinned(curve), 1.5, colour)
+            self._chart.line(thinned(curve), 1.5, colour)
             self._chart.disc(curve[-1], 2.2, colour)
         self._chart.show(self._frame)
 
@@ -271,8 +180,14 @@ class Canvas:
         """Draw the symbols, with their names to the right of them."""
         limit = scenario.conditions.thruster_limit
         jet = 0.5 * JET_LENGTH * METRE
-        signs = [("head", 16), ("centre of mass", 14), ("path", 20), ("track", 18)]
-        signs += [("reference posture", 20), (f"thrust of {limit / 2:g} N", round(jet))]
+        signs = [
+            ("head", 16),
+            ("centre of mass", 14),
+            ("its goal", 18),
+            ("path", 20),
+            ("track", 18),
+        ]
+        signs += [("reference", 20), (f"thrust of {limit / 2:g} N", round(jet))]
         signs += [("joints bend", 6)] if scenario.shifts else []
         x, y = 14.0, LEGEND
         for k, (name, width) in enumerate(signs):
@@ -285,13 +200,15 @@ class Canvas:
             elif k == 1:
                 sign.centre_of_mass(middle)
             elif k == 2:
-                sign.disc(np.linspace(ends[0], ends[1], 7)[1::2], 1.3, INK)
+                cross_hair(sign, middle, 0.6)
             elif k == 3:
-                sign.line(ends, 2.2, TRAIL)
+                sign.disc(np.linspace(ends[0], ends[1], 7)[1::2], 1.3, INK)
             elif k == 4:
-                sign.outline(middle + LINK * (0.5 * width, 5.0), 1.5, REFERENCE)
+                sign.line(ends, 2.2, TRAIL)
             elif k == 5:
-                _draw_jet(sign, ends[0], np.array([0.5, 0.0]))
+                sign.outline(middle + LINK * (0.5 * width, 5.0), 1.5, OUTLINE)
+            elif k == 6:
+                draw_jet(sign, ends[0], np.array([jet, 0.0]))
             else:
                 sign.dashes(middle[0], y - 7, y + 7, HEAD)
             sign.show(self._frame)
@@ -301,26 +218,6 @@ class Canvas:
         self, text: str, at: tuple[float, float], size: int, colour: Colour, align: float = LEFT
     ) -> float:
         return write(self._frame, self._unit, text, at, size, colour, align)
-
-
-def _draw_jet(panel: Panel, start: Points, flow: Points, breadth: float = 1.0) -> None:
-    """Draw a jet from a point of the canvas; a flow of length one is that at the limit."""
-    strength = np.hypot(*flow)
-    if strength < 0.01:
-        return
-    ahead = JET_LENGTH * METRE * flow
-    across = 5.0 * breadth * np.array([-flow[1], flow[0]]) / strength
-    for share, width, colour in ((1.0, 1.0, JET), (0.7, 0.5, JET_CORE)):
-        end, wide = start + 0.9 * share * ahead, width * across
-        tip = start + share * ahead
-        corners = [start - 0.5 * wide, end - wide, tip, end + wide, start + 0.5 * wide]
-        panel.shape(np.array(corners), colour, colour)
-
-
-def _thinned(points: Points, most: int = 4000) -> Points:
-    """Keep at most `most` of the points and the last; few choices change as points are added."""
-    stride = -(-len(points) // most)
-    return points if stride == 1 else np.concatenate([points[::stride], points[-1:]])
 
 
 def _limit(metres: float) -> str:

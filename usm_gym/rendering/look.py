@@ -25,6 +25,14 @@ TRAIL = (0, 140, 105)
 ALARM = (176, 36, 24)
 
 
+def faded(colour: Colour, share: float, ground: Colour = WATER) -> Colour:
+    """A share of a colour, the rest of it that of the ground."""
+    red, green, blue = (
+        round(share * a + (1 - share) * b) for a, b in zip(colour, ground, strict=True)
+    )
+    return red, green, blue
+
+
 def link_shapes(corners: int) -> tuple[Points, Points]:
     """Superellipses: a link, and the head, over half length and half width, (corners, 2) each."""
     turn = np.linspace(0.0, 2 * np.pi, corners, endpoint=False)

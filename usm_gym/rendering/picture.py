@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.water import Water
 
 Array = NDArray[np.float64]
 # A lost robot may be anywhere; it is shown at most this far from its reference, m.
@@ -99,7 +100,7 @@ class Recorder:
             body=Posture(robot.link_centres(theta, position), theta),
             reference=Posture(robot.link_centres(wanted, here), wanted),
             thrust=np.nan_to_num(simulation.read("force")[index]) / simulation.limit[index],
-            current=simulation.read("water_velocity")[index],
+            current=velocity(scenario.water, count * scenario.conditions.control_period),
             path=self._path,
             instants=instants,
             errors=np.clip(self._errors[instants], -FAR, FAR),
@@ -117,3 +118,29 @@ def reference_angles(simulation: Simulation, index: int) -> Array:
     theta = np.nan_to_num(simulation.read("theta")[index])
     heading, own = (theta[-1], shape[-1]) if by_head else (theta.mean(), shape.mean())
     return np.asarray(shape - own + heading - simulation.attitude_error[index])
+
+
+def velocity(water: Water, time: float) -> Array:
+    """Velocity of the water, m/s, (2,); a simulation has none before its first step."""
+    moving = np.array(water.current)
+    for amplitude, phase, frequency in _sinusoids(water):
+        moving += amplitude * np.sin(phase + frequency * time)
+    return moving
+
+
+def drift(water: Water, time: float) -> Array:
+    """How far the water has moved since the start, m, (2,)."""
+    moved = np.array(water.current) * time
+    for amplitude, phase, frequency in _sinusoids(water):
+        moved += amplitude * (np.cos(phase) - np.cos(phase + frequency * time)) / frequency
+    return moved
+
+
+def _sinusoids(water: Water) -> list[tuple[Array, Array, float]]:
+    """Amplitudes, m/s, (2,), phases at the start, (2,), and frequency, rad/s."""
+    slow = (np.array(water.amplitude), np.array(water.phase), 2 * np.pi / water.period)
+    waves = [
+        (np.array(wave.amplitude), np.full(2, wave.phase), 2 * np.pi / wave.period)
+        for wave in water.waves
+    ]
+    return [slow, *waves]

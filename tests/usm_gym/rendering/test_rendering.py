@@ -15,8 +15,10 @@ import usm_baselines
 
 import usm_gym
 from usm_gym.rendering import canvas as rendering
-from usm_gym.rendering.canvas import HEAD, JET_CORE, REFERENCE, SCENE, TAIL, TRAIL, Canvas
+from usm_gym.rendering.canvas import SCENE, Canvas
+from usm_gym.rendering.look import HEAD, JET_CORE, REFERENCE, TAIL, TRAIL
 from usm_gym.rendering.picture import Recorder
+from usm_gym.rendering.scene import OUTLINE
 from usm_gym.rendering.window import Window, _windows
 
 ID = "usm_gym:USM-Operation-v0"
@@ -97,7 +99,11 @@ def test_the_frame_shows_the_robot():
     assert len(tail) > 100
     assert head[:, 0].mean() - tail[:, 0].mean() > 300
     assert len(places(frame, TRAIL)) > 10
-    assert len(places(frame, REFERENCE)) > 10  # the body lags behind the reference
+    assert len(places(frame, OUTLINE)) > 10  # the body lags behind the reference
+    cross = places(frame, REFERENCE)
+    middle = np.array([SCENE.centerx, SCENE.centery - SCENE.top])
+    assert np.abs(cross - middle).max() < 20  # the goal, which the view follows
+    assert np.ptp(cross, axis=0).min() > 20
     env.step(np.zeros(5, np.float32))
     assert (env.render() != frame).any()
 
