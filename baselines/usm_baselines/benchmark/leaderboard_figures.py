@@ -16,20 +16,22 @@ from usm_baselines.benchmark.leaderboard import (
     best_of_laws,
 )
 from usm_baselines.benchmark.results import axes_in
-from usm_baselines.benchmark.verdict import choices, front
+from usm_baselines.benchmark.verdict import REASONS, choices, front
 from usm_gym.statistics import performance_profile
 from usm_gym.support.text import figures
 from usm_gym.task.metrics import MAX_ERROR
 
-# Of Okabe and Ito, to be told apart by all eyes; those that are not in focus are grey.
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+# Of Okabe and Ito, to be told apart by all eyes, one for each reason to be in focus; the others
+# are grey.
+COLOURS = ("#0072b2", "#d55e00", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
 GREY, LIGHT, INK = "0.72", "0.85", "0.25"
 # An equal seed makes equal files.
-SVG = {"svg.hashsalt": "usm-gym", "svg.fonttype": "none", "font.size": 9}
+SVG: Any = {"svg.hashsalt": "usm-gym", "svg.fonttype": "none", "font.size": 9}
 # Errors beyond so many times the largest one in focus are off the figure.
-ROOM = 1.6
+ROOM = 2.0
 # The height of a line of labels, points.
 LINE = 9.5
+LABEL: dict[str, Any] = {"fontsize": 8, "color": INK}
 
 
 def draw_all(result: LeaderboardResult, folder: Path) -> None:
@@ -64,11 +66,16 @@ def _verdict(result: LeaderboardResult) -> Any:
         panel.set_title(tier, fontweight="bold", loc="left")
         panel.set(xscale="log", yscale="log", xlabel="thrust variation [N/s]")
         _pareto(panel, rows)
+        if rows is result.main:
+            _other_weights(panel, result)
     axes = " + ".join(result.axes)
     panels[0, 0].set_ylabel(f"largest error after settling, {axes} [mm]")
     figure.draw_without_rendering()  # so that labels know where the points are
     for panel, rows in zip(panels[0], tiers.values(), strict=True):
-        _label(panel, _places(rows, focus(rows)))
+        low, high = panel.get_ylim()
+        named = dict.fromkeys([*focus(rows), *front(rows)])
+        places = _places(rows, (id for id in named if rows[id].competitor))
+        _label(panel, {id: at for id, at in places.items() if at[0] > 0.0 and low < at[1] < high})
     return figure
 
 
@@ -85,20 +92,38 @@ def _pareto(panel: Any, rows: Mapping[str, Standing]) -> None:
             panel.plot(*at, "o", color=GREY, markersize=3.5, zorder=1)
         elif id in colours:
             panel.axhline(at[1], color=INK, linewidth=0.8, linestyle=":", zorder=0)
-    left, right = min(x for x, _ in seen.values()) / 2.0, 2.0 * max(x for x, _ in seen.values())
+            panel.annotate(
+                id,
+                (1.0, at[1]),
+                (-2, -3),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                **LABEL,
+                ha="right",
+                va="top",
+            )
+    variations = [x for x, _ in seen.values()] or [1.0]
+    left, right = min(variations) / ROOM, max(variations) * ROOM
     # Nobody is below and to the left of this line.
-    best = np.array([seen[id] for id in front(rows) if id in seen])
-    steps = np.array([[best[0, 0], high], *best, [right, best[-1, 1]]])
-    panel.step(*steps.T, where="post", color=LIGHT, linewidth=1.5, zorder=0)
+    if best := [seen[id] for id in front(rows) if id in seen]:
+        steps = np.array([(best[0][0], high), *best, (right, best[-1][1])])
+        panel.step(*steps.T, where="post", color=LIGHT, linewidth=2.0, zorder=0)
     panel.set(xlim=(left, right), ylim=(low, high))
     _plain(panel)
 
 
+def _other_weights(panel: Any, result: LeaderboardResult) -> None:
+    """What else the laws can do that are tuned with other weights of thrust variation."""
+    for points in result.front.values():
+        errors = [1e3 * sum(point.errors.values()) for point in points]
+        variations = [point.thrust_variation for point in points]
+        panel.plot(variations, errors, color=GREY, linewidth=0.8, zorder=0)
+
+
 def focus(rows: Mapping[str, Standing]) -> dict[str, str]:
     """The policies that are named, with their colours."""
-    named = choices(rows)
-    colours = iter(COLOURS)
-    return {id: next(colours) if rows[id].competitor else INK for id in named}
+    colours = dict(zip(REASONS, COLOURS, strict=True))
+    return {id: colours.get(reasons[0], INK) for id, reasons in choices(rows).items()}
 
 
 def _places(rows: Mapping[str, Standing], names: Iterable[str]) -> dict[str, tuple[float, float]]:
@@ -115,20 +140,18 @@ def _label(panel: Any, places: Mapping[str, tuple[float, float]]) -> None:
     taken: list[tuple[bool, float]] = []
     pixels = panel.figure.dpi / 72
     for id, (x, y) in sorted(seen.items(), key=lambda pair: pair[1][1]):
-        right = bool(x > middle)
-        height = y
+        right, height = bool(x > middle), y + 0.4 * LINE * pixels
         while any(side == right and abs(height - at) < LINE * pixels for side, at in taken):
             height += 1.0
         taken.append((right, height))
         panel.annotate(
             id,
             places[id],
-            xytext=(-7 if right else 7, (height - y) / pixels),
+            (-7 if right else 7, (height - y) / pixels),
             textcoords="offset points",
+            **LABEL,
             ha="right" if right else "left",
             va="center",
-            fontsize=8,
-            color=INK,
         )
 
 
