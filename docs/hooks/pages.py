@@ -18,7 +18,7 @@ SPEED = "<!-- bench.json -->"
 def on_files(files, config):
     """Add what lies outside `docs`."""
     outside = {name: ROOT / name for name in ("CONTRIBUTING.md", "CHANGELOG.md")}
-    for kind in ("md", "png"):
+    for kind in ("md", "png", "svg"):
         for path in sorted(RESULTS.rglob(f"*.{kind}")):
             outside[f"results/{path.relative_to(RESULTS).as_posix()}"] = path
     for place, path in outside.items():
@@ -60,4 +60,7 @@ def speed(path):
     machine, source = result.machine, result.provenance
     where = f"{machine.processor}, {machine.cores} cores, {machine.system}"
     by = f"By `{source.command}`, commit {source.commit}, on {where}."
-    return "\n".join([by, "", *lines])
+    decisions = ["", "| a decision for one robot | median, us |", "|---|---:|"]
+    for id, spread in sorted(result.decisions.items(), key=lambda pair: pair[1].median):
+        decisions.append(f"| `{id}` | {figures(spread.median)} |")
+    return "\n".join([by, "", *lines, *(decisions if result.decisions else [])])

@@ -83,7 +83,11 @@ def test_a_leaderboard(axes, tmp_path):
     assert [name for name in head.split(",") if name.startswith("max_error") and name[-2] == "_"]
     assert {len(line.split(",")) for line in lines} == {len(head.split(","))}
     leaderboard_figures.draw_all(result, tmp_path)
-    assert len(list(tmp_path.glob("*.png"))) == 3
+    assert {path.stem for path in tmp_path.glob("*.png")} == {
+        "verdict",
+        "profiles",
+        f"errors-{MAIN}",
+    }
 
 
 @axes

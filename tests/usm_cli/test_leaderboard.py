@@ -67,12 +67,14 @@ def test_the_leaderboard_is_the_same_with_one_and_two_workers(
     assert len(lines) == 6
     assert float(lines[0]["max_error_x"]) == next(iter(rows.values()))["max_error_x"]["mean"]
     page = (folder / "page.md").read_text()
-    assert page.startswith("before\n<!-- leaderboard -->\n| | policy |")
+    assert page.startswith("before\n<!-- leaderboard -->\n![")
     assert page.endswith("after\n")
     result = board.LeaderboardResult.read(folder / "1" / "leaderboard.json")
-    assert page[7:-6] == leaderboard_page.readme_block(result)
-    for figure in ("errors", "profiles", "variation"):
+    assert page[7:-6] == leaderboard_page.readme_block(result, "2/verdict.svg", {})
+    for figure in ("verdict", "profiles", "errors-operation"):
         assert (folder / "1" / f"{figure}.png").stat().st_size > 10_000
+        written = [(folder / run / f"{figure}.svg").read_bytes() for run in "12"]
+        assert written[0] == written[1]
     capsys.readouterr()
 
 

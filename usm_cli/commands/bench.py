@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -11,6 +11,7 @@ import gymnasium as gym
 from rich.table import Table
 
 from usm_cli import speed as benchmark
+from usm_cli.decisions import decision_times, policies
 from usm_cli.speed import (
     BATCH_PERIOD,
     ROBOTS,
@@ -32,7 +33,8 @@ DESCRIPTION = """\
 Measure the speed on this machine. Figures and their peers are measured in the same run, in turns,
 round by round. Prints medians with the smallest and largest values, and names the peers that are
 not installed (extra `bench`). Finer physics steps have their price beside the error that they
-leave, against the finest. Takes two minutes; let the machine do nothing else meanwhile.
+leave, against the finest. The last table says how long every policy takes to decide for one robot.
+Takes some minutes; let the machine do nothing else meanwhile.
 """
 
 PEERS = {
@@ -119,12 +121,15 @@ def run(arguments: argparse.Namespace) -> None:
     rows = list(benchmark.growth(min(rounds, 5))) if arguments.growth else []
     if rows:
         console.print(growth_table(rows))
+    decisions = decision_times(policies(), min(rounds, 5))
+    console.print(decisions_table(decisions))
     if arguments.output:
         result = SpeedResult(
             medians={name: figure.median for name, figure in measured.items()},
             spread=measured,
             missing=tuple(missing),
             growth=tuple(rows),
+            decisions=decisions,
             machine=benchmark.machine(),
             provenance=Provenance.here({"rounds": rounds}),
         )
@@ -190,4 +195,12 @@ def growth_table(rows: list[Growth]) -> Table:
     for row in rows:
         counts = [str(count) for count in (row.links, row.robots, row.threads)]
         table.add_row(*counts, figures(row.ns), figures(row.ns / row.links))
+    return table
+
+
+def decisions_table(decisions: Mapping[str, Figure]) -> Table:
+    """How long policies take for a decision, the fastest first, for the terminal."""
+    table = empty_table("policy", numbers=("us per decision", "smallest", "largest"))
+    for id, figure in sorted(decisions.items(), key=lambda pair: pair[1].median):
+        table.add_row(id, *map(figures, (figure.median, figure.low, figure.high)))
     return table

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from rich.markdown import Markdown
@@ -19,6 +21,7 @@ from usm_cli.selection import (
     named_contenders,
     scored,
 )
+from usm_cli.speed import SpeedResult
 from usm_cli.terminal import output_console
 from usm_gym.evaluation import Evaluation
 from usm_gym.suites import NAMES
@@ -30,15 +33,15 @@ DESCRIPTION = """\
 Score every policy on the frozen suites that it is meant for, and on the operation suite with the
 joints still: policies that are tuned for `basin` or `sea` on the suites of these conditions only,
 and there no others but the paper's `sta` and `pd` and those that are no competitors. Policies that
-are named meet every suite. Writes leaderboard.json, leaderboard.csv, leaderboard.md and three
-figures (extra `render`) into a folder. After an interruption, run it again to continue: the folder
+are named meet every suite. Writes leaderboard.json, leaderboard.csv, leaderboard.md and figures
+(extra `render`) into a folder. After an interruption, run it again to continue: the folder
 `cache` there keeps the scores of a policy on a suite until something changes on which they depend.
 """
 EXAMPLES = f"""\
 {POLICIES}
 examples:
   usm leaderboard --workers 2                          into results/VERSION
-  usm leaderboard --insert README.md                   also a short table between its marks
+  usm leaderboard --insert README.md                   also the verdict, between its marks
   usm leaderboard --policies sta,my_module:MyController --output mine
   usm leaderboard --policies lqg-tuned,lqg-basin,lqg-sea --output tiers
                                                        a cross-table of gains and conditions, too
@@ -60,7 +63,7 @@ def add_to(subparsers: Any) -> None:
     add(
         "--insert",
         metavar="FILE",
-        help="page in which to update the short table of the operation suite",
+        help="page in which to update the verdict, and the whole table of the operation suite",
     )
     parser.set_defaults(run=run)
 
@@ -88,7 +91,19 @@ def run(arguments: argparse.Namespace) -> None:
         write_text(folder / "leaderboard.csv", csv_text(result))
         write_text(folder / "leaderboard.md", markdown(result))
         if page is not None:
-            write_text(arguments.insert, with_table(page, result))
+            figure = Path(os.path.relpath(folder / "verdict.svg", Path(arguments.insert).parent))
+            write_text(
+                arguments.insert,
+                with_table(page, result, figure.as_posix(), decision_times(folder)),
+            )
         draw_all(result, folder)
     output_console().print(Markdown(table(result.main)))
     leave_if_refused({id: why for rows in result.refused.values() for id, why in rows.items()})
+
+
+def decision_times(folder: Path) -> dict[str, float]:
+    """How long policies take for a decision, us, if `usm bench` has left that beside the tables."""
+    path = folder / "bench.json"
+    if not path.exists():
+        return {}
+    return {id: figure.median for id, figure in SpeedResult.read(path).decisions.items()}

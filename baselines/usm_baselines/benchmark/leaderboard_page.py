@@ -1,4 +1,4 @@
-"""The leaderboard as Markdown, as CSV, and as the table in the README."""
+"""The leaderboard as Markdown, as CSV, and as verdict and table in the README."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from usm_baselines.benchmark.leaderboard import (
     Lead,
     LeaderboardResult,
     Standing,
-    best_of_laws,
     crossed,
 )
 from usm_baselines.benchmark.results import (
@@ -26,8 +25,9 @@ from usm_baselines.benchmark.results import (
     rms_in,
     shifts_in,
 )
+from usm_baselines.benchmark.verdict import choices
 from usm_gym.statistics import FEWEST_EPISODES
-from usm_gym.support.text import degrees, figures, listed, mm
+from usm_gym.support.text import degrees, figures, give_or_take, listed, mm
 from usm_gym.support.validation import require
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
@@ -89,15 +89,34 @@ def table(rows: Mapping[str, Standing]) -> str:
     return "\n".join([*lines, *_notes(rows)]) + "\n"
 
 
+def verdict_table(rows: Mapping[str, Standing], decisions: Mapping[str, float]) -> str:
+    """The policies to choose from and what each is the best of, as Markdown.
+
+    Args:
+        rows: The rows of a suite, best first.
+        decisions: How long policies take for a decision, us, as far as it is known.
+    """
+    axes, places = axes_in(rows.values()), rank_labels(rows)
+    lines = [f"| | policy | why | error {' + '.join(axes)}, mm | variation, N/s | decision, µs |"]
+    lines.append("|---|---|---|---:|---:|---:|")
+    for id, reasons in choices(rows).items():
+        mean, margin = rows[id].combined
+        cells = [places[id], f"`{id}`", ", ".join(reasons), give_or_take(1e3 * mean, 1e3 * margin)]
+        cells.append(figures(rows[id].metrics["thrust_variation"].mean))
+        cells.append(figures(decisions[id]) if id in decisions else "")
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
 def brief_table(rows: Mapping[str, Standing]) -> str:
-    """The README's table: the rows of `best_of_laws`, in fewer columns."""
+    """The README's whole table, in fewer columns."""
     axes, angles = axes_in(rows.values()), attitude_in(rows.values())
     rms_axes = " / ".join(rms_in(rows.values()))
     columns = ["told", *(f"{axis}, mm" for axis in axes), f"rms {rms_axes}"]
     columns += [f"worst {' / '.join(axes)}", *(f"{angle}, °" for angle in angles)]
     lines = _head([*columns, "variation, N/s", "lost"])
     places = rank_labels(rows)
-    for id, row in best_of_laws(rows).items():
+    for id, row in rows.items():
         errors = row.errors.values()
         rms = " / ".join(mm(error.mean) for error in row.rms.values())
         worst = " / ".join(mm(error.worst) for error in errors)
@@ -171,19 +190,28 @@ def markdown(result: LeaderboardResult) -> str:
     return "\n".join(parts)
 
 
-def readme_block(result: LeaderboardResult) -> str:
-    """The main suite's short table between its marks."""
-    return f"{MARKS[0]}\n{brief_table(result.main)}{MARKS[1]}\n"
+def readme_block(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
+    """The verdict in every tier, and the whole table of the main suite, between their marks."""
+    axes = " + ".join(result.axes)
+    parts = [MARKS[0], f"![Error {axes} against thrust variation, tier by tier]({figure})\n"]
+    for tier, name in CROSSED.items():
+        if name in result.suites:
+            parts += [f"**In `{tier}`**\n", verdict_table(result.suites[name], decisions)]
+    parts.append(f"<details><summary>All {len(result.main)} policies in `field`</summary>\n")
+    parts += [brief_table(result.main), "</details>", MARKS[1], ""]
+    return "\n".join(parts)
 
 
-def with_table(page: str, result: LeaderboardResult) -> str:
-    """A page with the main suite's short table put between its marks.
+def with_table(
+    page: str, result: LeaderboardResult, figure: str, decisions: Mapping[str, float]
+) -> str:
+    """A page with verdict and table put between its marks; arguments as of `readme_block`.
 
     Raises:
         ValueError: If the page lacks the marks.
     """
     pattern = re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1]) + "\n"
-    block = readme_block(result)
+    block = readme_block(result, figure, decisions)
     changed, count = re.subn(pattern, lambda match: block, page, flags=re.DOTALL)
     require(count == 1, "marks of the table", count, f"one pair, {MARKS[0]} to {MARKS[1]}")
     return changed

@@ -6,11 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, asdict
 from typing import Annotated, Any, ClassVar, Self
 
+import numpy as np
 from pydantic import Field, TypeAdapter
 
 from usm_baselines.contender import Contender
 from usm_gym.evaluation import SHIFT_METRICS
-from usm_gym.statistics import Comparison
+from usm_gym.statistics import Comparison, mean_interval
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.text import figures
 from usm_gym.support.validation import Count, Number, Switch, require, validated
@@ -109,6 +110,13 @@ class Scores(Part):
     def objective(self) -> float:
         """What policies are ranked by, mm: see `usm_gym.task.metrics.objective`."""
         return float(objective({name: summary.mean for name, summary in self.metrics.items()}))
+
+    @property
+    def combined(self) -> tuple[float, float]:
+        """The largest errors of all axes added up, m: mean, half the width of its interval."""
+        episodes = np.sum([self.per_episode[MAX_ERROR + axis] for axis in self.axes], axis=0)
+        mean, (low, high) = mean_interval(episodes)
+        return mean, (high - low) / 2
 
     @property
     def rms(self) -> dict[str, Summary]:

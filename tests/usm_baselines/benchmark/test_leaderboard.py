@@ -16,8 +16,10 @@ from usm_baselines import registry
 from usm_baselines.benchmark import leaderboard as board
 from usm_baselines.benchmark import leaderboard_page
 from usm_baselines.benchmark.scoring import Job, Refusal
+from usm_baselines.benchmark.verdict import choices, front
 from usm_baselines.contender import contender
 
+from usm_cli.commands.leaderboard import decision_times
 from usm_gym.evaluation import Evaluation, metric_names
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.robot import Robot
@@ -170,20 +172,40 @@ def test_a_policy_that_is_no_competitor_comes_last_and_says_so() -> None:
     assert "| yes (1.00) |" in table
 
 
-def test_the_short_table_has_of_each_law_the_better_gains_and_those_of_the_paper() -> None:
+def made_up_rows(variation: dict[str, float]) -> dict[str, board.Standing]:
+    """Rows of policies by their thrust variation, N/s, each with a larger error than the last."""
+    scored = []
+    for k, (id, thrust) in enumerate(variation.items()):
+        scores = {name: np.full(50, 1e-3 * (1 + k)) for name in METRICS}
+        scores["thrust_variation"] = np.full(50, thrust)
+        scored.append((contender(id), Evaluation(scores, np.zeros(50, bool))))
+    return board.ranked(scored)
+
+
+def test_of_each_law_there_are_the_better_gains_and_those_of_the_paper() -> None:
     order = ("lqg", "lqg-tuned", "sta-lag", "sta-tuned", "pid-tuned", "sta", "pid")
-    rows = board.ranked(
-        [
-            (contender(id), Evaluation({n: np.full(50, k) for n in METRICS}, np.zeros(50, bool)))
-            for k, id in enumerate(order)
-        ]
-    )
+    rows = made_up_rows(dict.fromkeys(order, 1.0))
+    assert list(board.best_of_laws(rows)) == ["lqg", "sta-lag", "pid-tuned", "sta"]
     lines = leaderboard_page.brief_table(rows).splitlines()[2:]
-    assert [line.split(" | ")[1] for line in lines] == ["lqg", "sta-lag", "pid-tuned", "sta"]
-    assert lines[1].endswith(
-        "| lag | 2000 [2000, 2000] | 2000 [2000, 2000] "
-        "| 2000 / 2000 | 2000 / 2000 | 115 | 2.00 | 0 |"
-    )
+    assert [line.split(" | ")[1] for line in lines] == list(order)
+
+
+def test_a_verdict_names_the_best_of_each_kind_and_what_could_be_reached() -> None:
+    thrust = {"lqg-joints": 30.0, "indi": 40.0, "sta-lag-tuned": 50.0, "pid": 20.0, "sta": 200.0}
+    rows = made_up_rows({"informed": 35.0, **thrust})
+    found = choices(rows)
+    assert list(found) == [*thrust, "informed"]
+    assert found["lqg-joints"] == ["best of all", "best without learning"]
+    assert found["indi"] == ["best without foreseeing the joints"]
+    assert found["sta-lag-tuned"] == ["the paper's law at its best"]
+    assert found["pid"] == ["best calm one, at most 20 N/s"]
+    assert found["sta"] == ["the paper's law as printed"]
+    # Nobody is ahead of these in error and in thrust variation.
+    assert front(rows) == ["pid", "lqg-joints"]
+    lines = leaderboard_page.verdict_table(rows, {"pid": 12.3}).splitlines()[2:]
+    cells = lines[3].split(" | ")
+    assert cells[1:3] == ["`pid`", "best calm one, at most 20 N/s"]
+    assert cells[3:] == [f"{5.0 * len(rows['pid'].axes):.1f} ± 0.0", "20.0", "12.3 |"]
 
 
 def test_rows_that_the_data_do_not_tell_from_the_first_share_its_rank() -> None:
@@ -212,4 +234,7 @@ def test_readme_and_results_show_the_tables_of_the_leaderboard() -> None:
     assert made.with_suffix(".md").read_text(encoding="utf-8") == leaderboard_page.markdown(found)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert readme.count(leaderboard_page.MARKS[0]) == 1
-    assert leaderboard_page.readme_block(found) in readme
+    figure = f"results/{version('usm-gym')}/verdict.svg"
+    decisions = decision_times(made.parent)
+    assert leaderboard_page.readme_block(found, figure, decisions) in readme
+    assert (ROOT / figure).exists()

@@ -1,0 +1,79 @@
+"""The verdict of a leaderboard: which policy to take, and what it is the best of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from usm_baselines.benchmark.leaderboard import Standing
+from usm_baselines.benchmark.results import INFORMED, CompetitorScores
+from usm_baselines.families import Family
+from usm_baselines.gains import FOLDERS
+from usm_baselines.registry import entry, ids
+from usm_baselines.tiers import PAPER
+
+# The most that a calm policy changes its commands, N/s.
+CALM = 20.0
+# What a policy is told if it foresees what the joints will do.
+FORESIGHT = "joint references"
+# The paper's law.
+LAW = PAPER[0]
+# The row that is told all constants of an episode.
+LIMIT = "the limit: told all constants"
+
+REASONS: dict[str, Callable[[str, CompetitorScores], bool]] = {
+    "best of all": lambda id, row: True,
+    "best without learning": lambda id, row: not is_learned(id),
+    f"best calm one, at most {CALM:g} N/s": lambda id, row: (
+        row.metrics["thrust_variation"].mean <= CALM and not row.failures
+    ),
+    "best without foreseeing the joints": lambda id, row: FORESIGHT not in row.told,
+    "the paper's law at its best": lambda id, row: is_papers(id),
+    "the paper's law as printed": lambda id, row: id == LAW,
+}
+
+
+def choices(rows: Mapping[str, Standing]) -> dict[str, list[str]]:
+    """The policies between which a reader will choose, best first, with what each is the best of.
+
+    Args:
+        rows: The rows of a suite, best first.
+    """
+    found: dict[str, list[str]] = {}
+    for reason, fits in REASONS.items():
+        for id, row in rows.items():
+            if row.competitor and fits(id, row):
+                found.setdefault(id, []).append(reason)
+                break
+    for id, row in rows.items():
+        if not row.competitor and id.partition("-")[0] == INFORMED:
+            found[id] = [LIMIT]
+    return {id: found[id] for id in rows if id in found}
+
+
+def front(rows: Mapping[str, CompetitorScores]) -> list[str]:
+    """The competitors to which none is ahead in both error and thrust variation, calmest first.
+
+    Without those that lose robots.
+    """
+    points = {
+        id: (row.metrics["thrust_variation"].mean, row.combined[0])
+        for id, row in rows.items()
+        if row.competitor and not row.failures
+    }
+    order = sorted(points, key=lambda id: points[id])
+    best: list[str] = []
+    for id in order:
+        if not best or points[id][1] < points[best[-1]][1]:
+            best.append(id)
+    return best
+
+
+def is_learned(id: str) -> bool:
+    """Whether a policy is, or stands on, a trained network."""
+    return id in ids() and entry(id).family is Family.LEARNED
+
+
+def is_papers(id: str) -> bool:
+    """Whether a policy is the paper's law, with any gains, lag and estimates."""
+    words = id.split("-")
+    return words[0] == LAW and set(words[1:]) <= {"lag", "navigator", *FOLDERS}
