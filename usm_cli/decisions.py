@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from usm_baselines.registry import entry, make
-from usm_baselines.tiers import competitors
+from usm_baselines.tiers import meant_for
 
 from usm_cli.speed import Figure, Timing, interleaved, summarise
 from usm_gym.simulation import Simulation
@@ -21,9 +21,10 @@ DECISIONS = 100
 
 
 def policies() -> list[str]:
-    """The policies that are timed: all competitors of all tiers, without those on request."""
-    tiers = (competitors(conditions) for conditions in PRESETS.values())
-    return list(dict.fromkeys(id for tier in tiers for id in tier))
+    """The policies that are timed: all that are meant for a tier, but those given true state."""
+    tiers = (meant_for(conditions) for conditions in PRESETS.values())
+    ids = dict.fromkeys(id for tier in tiers for id in tier)
+    return [id for id in ids if not entry(id).privileged]
 
 
 def decision_times(
