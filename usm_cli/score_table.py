@@ -25,10 +25,10 @@ from usm_baselines.benchmark.results import (
 )
 
 from usm_cli.terminal import empty_table
-from usm_gym.statistics import FEWEST_EPISODES, mean_interval, ratio_interval
-from usm_gym.support.text import degrees, figures, give_or_take, listed, mm
+from usm_gym.statistics import FEWEST_EPISODES, ratio_interval
+from usm_gym.support.text import counted, degrees, figures, give_or_take, listed, mm
 from usm_gym.task.loss import LOST_ERROR
-from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
+from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
 LEGEND = """\
 error: largest position error after settling, {axes} added up, mean ± half of its 95 % interval; \
@@ -125,9 +125,8 @@ def legend(rows: Mapping[str, Standing]) -> str:
 
 def combined_error(row: Scores) -> str:
     """The largest errors of all axes added up, mm, with half the width of its interval."""
-    episodes = np.sum([row.per_episode[MAX_ERROR + axis] for axis in row.axes], axis=0)
-    mean, (low, high) = mean_interval(1e3 * episodes)
-    return give_or_take(mean, (high - low) / 2)
+    mean, margin = row.combined
+    return give_or_take(1e3 * mean, 1e3 * margin)
 
 
 def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np.float64]]) -> str:
@@ -143,8 +142,8 @@ def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np
     best, episodes = rows[first], rows[first].episodes
     if episodes < FEWEST_EPISODES:
         return (
-            f"{first} is ahead with an error of {combined_error(best)} mm, but {episodes} "
-            f"scenarios are too few to say who wins; {FEWEST_EPISODES} are the fewest."
+            f"{first} is ahead with an error of {combined_error(best)} mm, but "
+            f"{counted(episodes, 'scenario')} cannot say who wins; it takes {FEWEST_EPISODES}."
         )
     # By the rule of ranks, the data tell a row from the first unless it shares its rank.
     tied = [name for name in others if rows[name].rank == best.rank]

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -117,9 +117,9 @@ class SpeedResult(Part, Result):
         spread: The figures with their spread.
         missing: Figures that need a package that is not installed.
         growth: Costs for more links, robots and threads, if measured.
-        decisions: How long policies take for a decision, for one robot, us.
         machine: The machine.
         provenance: The origin of the figures.
+        decisions: How long policies take for a decision, for one robot, us.
     """
 
     kind: ClassVar[str] = "bench"
@@ -131,8 +131,7 @@ class SpeedResult(Part, Result):
     growth: tuple[Growth, ...]
     machine: Machine
     provenance: Provenance
-    _: KW_ONLY
-    decisions: Mapping[str, Figure] = field(default_factory=dict)
+    decisions: Mapping[str, Figure]
 
     def __post_init__(self) -> None:
         """Refuse medians of other figures."""

@@ -63,4 +63,4 @@ def speed(path):
     decisions = ["", "| a decision for one robot | median, us |", "|---|---:|"]
     for id, spread in sorted(result.decisions.items(), key=lambda pair: pair[1].median):
         decisions.append(f"| `{id}` | {figures(spread.median)} |")
-    return "\n".join([by, "", *lines, *(decisions if result.decisions else [])])
+    return "\n".join([by, "", *lines, *decisions])

@@ -91,7 +91,7 @@ def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):
     assert re.search(r"1= +sta .+\n.+1= +pd ", answer.stdout)
     said = " ".join(answer.stdout.split())
     assert "sta is ahead with an error of" in said
-    assert said.endswith("too few to say who wins; 50 are the fewest.")
+    assert said.endswith("cannot say who wins; it takes 50.")
     data = json.loads(output.read_text())
     assert data["episodes"] == 3
     assert len(data["scenarios"]) == 3

@@ -15,7 +15,7 @@ import usm_gym
 from usm_cli.program import main
 from usm_cli.report import chapters, page, plots
 from usm_cli.report.replay import packed
-from usm_gym.rendering import canvas as rendering
+from usm_gym.rendering import look
 from usm_gym.support.provenance import provenance
 from usm_gym.support.results import Provenance
 
@@ -159,7 +159,7 @@ def test_the_colours_are_those_of_the_films():
     light = style[: style.index("@media")]
     names = ("INK", "BODY", "BODY_EDGE", "HEAD", "HEAD_EDGE", "TAIL", "JET", "JET_CORE")
     for name in (*names, "CURRENT", "REFERENCE"):
-        colour = "#{:02x}{:02x}{:02x}".format(*getattr(rendering, name))
+        colour = "#{:02x}{:02x}{:02x}".format(*getattr(look, name))
         assert f"--{name.lower().replace('_', '-')}: {colour};" in light, name
 
 

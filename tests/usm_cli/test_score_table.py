@@ -142,7 +142,7 @@ def test_the_sentence_says_whom_the_data_do_not_tell_from_the_first():
 
 def test_from_few_scenarios_nothing_is_concluded():
     said = concluded(pairs(1e-3, 9e-3, episodes=4))
-    assert "4 scenarios are too few" in said
+    assert "4 scenarios cannot say who wins" in said
     assert f"{NAMES[0]} wins" not in said
 
 

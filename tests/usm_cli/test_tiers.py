@@ -21,6 +21,7 @@ def chosen(tmp_path, monkeypatch):
     """Return what an evaluation of a scenario of the chosen suite writes; the laws are made up."""
     register_with_tiers(monkeypatch, tmp_path, "mine")
     monkeypatch.setattr(selection, "suite", lambda name: suite(name)[:1])
+    monkeypatch.setenv("COLUMNS", "120")
     output = tmp_path / "result.json"
 
     def evaluated(*arguments):

@@ -29,6 +29,7 @@ from usm_cli.terminal import output_console
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
+from usm_gym.support.text import counted
 from usm_gym.task.scenario import Scenario
 
 DESCRIPTION = """\
@@ -86,7 +87,8 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output:
         write(arguments, scenarios, known, scores, refused)
     if scores:
-        where = f"{suite_name(arguments) or 'sampled'}, {len(scenarios)} scenarios, best first"
+        many = counted(len(scenarios), "scenario")
+        where = f"{suite_name(arguments) or 'sampled'}, {many}, best first"
         show([(known[name], evaluation) for name, evaluation in scores.items()], where)
     leave_if_refused(refused)
 

@@ -26,6 +26,11 @@ def degrees(radians: float) -> str:
     return figures(math.degrees(radians))
 
 
+def counted(number: int, thing: str) -> str:
+    """Count things as in a sentence: "1 episode", "2 episodes"."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
 def listed(words: Sequence[str]) -> str:
     """List words as in a sentence: "x", "x and y", "x, y and z"."""
     *most, last = words

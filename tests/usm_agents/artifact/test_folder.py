@@ -268,7 +268,7 @@ def test_an_agent_that_is_killed_while_it_is_replaced_is_the_old_one_or_the_new_
 def test_the_command_line_takes_a_folder(folder, capsys):
     command = ["evaluate", "--policies", str(folder), "--episodes", "1"]
     main(command)
-    assert "sampled, 1 episodes" in capsys.readouterr().out
+    assert "sampled, 1 scenario, best first" in capsys.readouterr().out
     tampered(folder)
     with pytest.raises(SystemExit) as left:
         main(command)
