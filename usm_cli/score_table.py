@@ -136,10 +136,16 @@ def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np
         rows: The rows, best first.
         objectives: The objective by policy and episode, mm, (episodes,).
     """
-    first, *others = [name for name, row in rows.items() if row.competitor] or [""]
-    if not others:
-        return "There is no second competitor to compare with."
+    competing = [name for name, row in rows.items() if row.competitor]
+    if not competing:
+        return "None of these policies competes."
+    first, *others = competing
     best, episodes = rows[first], rows[first].episodes
+    if not others:
+        return (
+            f"{first} has an error of {combined_error(best)} mm over "
+            f"{counted(episodes, 'scenario')}; name a second policy to compare it with."
+        )
     if episodes < FEWEST_EPISODES:
         return (
             f"{first} is ahead with an error of {combined_error(best)} mm, but "

@@ -152,7 +152,10 @@ def test_what_is_told_more_than_a_vehicle_knows_does_not_win():
     assert concluded(scores).startswith(f"{NAMES[0]} wins")
     assert "no competitors" in legend(ranked(scores))
     assert "no competitors" not in legend(ranked(scores[1:]))
-    assert "no second" in concluded(scores[:2])
+    alone = concluded(scores[:2])
+    assert alone.startswith(f"{NAMES[0]} has an error of ")
+    assert alone.endswith(" over 50 scenarios; name a second policy to compare it with.")
+    assert concluded(scores[:1]) == "None of these policies competes."
 
 
 def test_a_narrow_table_of_shifts_keeps_the_first_and_the_last():
