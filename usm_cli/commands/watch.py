@@ -27,7 +27,7 @@ from usm_gym.task.metrics import MAX_ERROR, axes_of
 DESCRIPTION = """\
 Watch a policy in an episode, or two or three, one above the other, in the same scenario with the
 same noise, in a window (Escape closes it) or in a film. The picture shows the robot and the shape
-that it shall have, the jets of its thrusters, the current, the centre of mass and its goal, and the
+that it should have, the jets of its thrusters, the current, the centre of mass and its goal, and the
 error, magnified and over time. Needs the extra `render`.
 """
 EXAMPLES = f"""\
@@ -82,9 +82,8 @@ def run(arguments: argparse.Namespace) -> None:
         medium = path.suffix
         require(medium in film.FPS, "--output", arguments.output, "a file .mp4 or .gif")
         check_writable(path)
-    else:
-        if not has_display():
-            raise UsageError("no display found; add --output run.mp4")
+    elif not has_display():
+        raise UsageError("no display found; add --output run.mp4")
     contenders = named_contenders(arguments.policies or "sta")
     require(len(contenders) <= 3, "--policies", arguments.policies, "one to three names")
     names = shown_names(arguments.names, [contender.name for contender in contenders])

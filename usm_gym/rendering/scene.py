@@ -71,7 +71,7 @@ class Scene:
             frame: The frame.
             picture: The picture.
             track: Colour of the track of the centre of mass.
-            bar: Where a bar as long as the grid is wide shall end; None for no bar.
+            bar: Where a bar as long as the grid is wide ends; None for no bar.
         """
         panel = self._panel
         panel.clear()
