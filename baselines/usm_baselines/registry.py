@@ -159,6 +159,12 @@ def tuned(file: GainsFile) -> Registration:
     )
 
 
+def base_of(id: str) -> str:
+    """The policy of which another is a form, with other gains or estimates; itself if of none."""
+    law, _, form = id.rpartition("-")
+    return base_of(law) if form in (*FOLDERS, "lag", "navigator") and law in _entries else id
+
+
 def ids() -> list[str]:
     """Names of all registered policies, in the order of registration."""
     return list(_entries)

@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 from usm_baselines.families import Family
-from usm_baselines.registry import POSITION_ONLY, entry, ids
+from usm_baselines.registry import POSITION_ONLY, base_of, entry, ids
 
 from usm_cli.terminal import output_console
 
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> None:
     console = output_console()
     laws: dict[str, list[str]] = {}
     for id in ids():
-        laws.setdefault(law_of(id), []).append(id)
+        laws.setdefault(base_of(id), []).append(id)
     for family in (*Family, None):
         members = [law for law in laws if entry(law).family is family]
         if not members:
@@ -59,12 +59,6 @@ def run(arguments: argparse.Namespace) -> None:
         console.print()
     forms = "\n".join(f"  NAME-{form}: {meaning}" for form, meaning in FORMS.items())
     console.print(f"{TOLD}\nOther forms of a law:\n{forms}", markup=False)
-
-
-def law_of(id: str) -> str:
-    """The policy of which another is a form; itself if it is none."""
-    law, _, form = id.rpartition("-")
-    return law_of(law) if form in FORMS and law in ids() else id
 
 
 def described(law: str, forms: Sequence[str]) -> Text:

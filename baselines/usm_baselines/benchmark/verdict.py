@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from usm_baselines.benchmark.leaderboard import Standing
 from usm_baselines.benchmark.results import INFORMED, CompetitorScores
 from usm_baselines.families import Family
-from usm_baselines.gains import FOLDERS
-from usm_baselines.registry import entry, ids
+from usm_baselines.registry import base_of, entry, ids
 from usm_baselines.tiers import PAPER
 
 # The most that a calm policy changes its commands, N/s.
@@ -75,5 +74,4 @@ def is_learned(id: str) -> bool:
 
 def is_papers(id: str) -> bool:
     """Whether a policy is the paper's law, with any gains, lag and estimates."""
-    words = id.split("-")
-    return words[0] == LAW and set(words[1:]) <= {"lag", "navigator", *FOLDERS}
+    return base_of(id) == LAW
