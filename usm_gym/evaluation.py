@@ -126,8 +126,8 @@ def evaluate(
         The scores.
 
     Raises:
-        ValueError: If there is no scenario, or the policy wants another observation or returns what
-            is no action.
+        ValueError: If there is no scenario, or the policy is a class or has no `predict`, wants
+            another observation, or returns what is no action.
     """
     listed = isinstance(scenarios, Sequence) and len(scenarios) > 0
     valid = listed and all(hasattr(scenario, "body") for scenario in scenarios)
@@ -344,7 +344,9 @@ def _require_period(policy: Any, period: float) -> None:
 
 
 def _require_fit(policy: Any, scenario: Any) -> None:
-    """Refuse a model that was trained on another observation, such as the residual task's."""
+    """Refuse what does not act, and a model of another observation, such as the residual task's."""
+    acts = callable(getattr(policy, "predict", None)) and not isinstance(policy, type)
+    require(acts, "policy", policy, "an object with `predict`, and not its class")
     space = getattr(policy, "observation_space", None)
     if space is not None:
         shape = world_of(scenario.body).layout.space.shape

@@ -316,6 +316,12 @@ def test_actions_beyond_the_bounds_saturate() -> None:
     assert result.per_episode["thrust_variation"][0] == 0.0
 
 
+@pytest.mark.parametrize("given", [Still, "sta", None])
+def test_what_does_not_act_is_refused(given: Any) -> None:
+    with pytest.raises(ValueError, match=r"policy is .*`predict`"):
+        usm_gym.evaluate(given, mixed()[:1])
+
+
 @pytest.mark.parametrize(
     ("scenarios", "options", "named"),
     [([], {}, "scenarios"), (mixed()[:1], {"workers": 0}, "workers")],
