@@ -33,10 +33,9 @@ from usm_gym.task.scenario import MODES, Mode, Scenario
 # Stands for all competitors among the names of policies.
 ALL = "all"
 POLICIES = """\
-policies:
-  an id (see usm policies), ID@gains.json with gains from `usm tune`, the folder of an agent from
-  `usm train`, or my_module:MyController, your own class or function with the predict method of
-  Stable-Baselines3 (docs/own_controller.md)
+A policy is an id (see usm policies), ID@gains.json with gains from `usm tune`, the folder of an
+agent from `usm train`, or my_module:MyController, your own class or function with the predict
+method of Stable-Baselines3 (docs/own_controller.md).
 """
 DEFAULT = "a short list; `all` stands for all competitors meant for the conditions"
 # A process takes as long to start as it takes to score some three policies on fifty episodes.

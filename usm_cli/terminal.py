@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
+import textwrap
 from collections.abc import Iterable
 from typing import Any, NoReturn
 
@@ -16,13 +18,31 @@ from rich.table import Table
 from usm_gym.support.validation import SAID, clipped
 
 
+class HelpFormatter(argparse.HelpFormatter):
+    """Fits texts into the terminal: fills paragraphs, and keeps indented lines, such as examples."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return "\n".join(
+            textwrap.fill(line, width, subsequent_indent=hanging(line), break_on_hyphens=False)
+            for line in re.sub(r"(?<=\S)\n(?=\S)", " ", text.strip("\n")).split("\n")
+        )
+
+
+def hanging(line: str) -> str:
+    """The indent of what does not fit into a line: of an example, that of its second column."""
+    indented = re.match(r" +(\S.*?  +(?=\S))?", line)
+    if indented is None:
+        return ""
+    return " " * (indented.end() if indented[1] else indented.end() + 4)
+
+
 class Parser(argparse.ArgumentParser):
-    """An argument parser that keeps the lines of its texts and reports an error in one line."""
+    """An argument parser that fits its texts into the terminal and reports an error in one line."""
 
     def __init__(self, **options: Any) -> None:
         """Take the options of `argparse.ArgumentParser`."""
         super().__init__(**options)
-        self.formatter_class = argparse.RawDescriptionHelpFormatter
+        self.formatter_class = HelpFormatter
 
     def error(self, message: str) -> NoReturn:
         """Leave with status 2."""
