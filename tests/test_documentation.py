@@ -94,11 +94,12 @@ def folder(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "results", tmp_path / "results")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
-    few = {name: scenarios[:2] for name, scenarios in leaderboard.suites().items()}
+    few = {name: [*map(brief, frozen[:2])] for name, frozen in leaderboard.suites().items()}
     monkeypatch.setattr(leaderboard, "suites", lambda: few)
-    sampled, unseen = Plan.scenario, selection.unseen
+    sampled, unseen, suite = Plan.scenario, selection.unseen, selection.suite
     monkeypatch.setattr(Plan, "scenario", lambda *given: brief(sampled(*given)))
     monkeypatch.setattr(selection, "unseen", lambda *given: [*map(brief, unseen(*given))])
+    monkeypatch.setattr(selection, "suite", lambda *given: [*map(brief, suite(*given))])
     trained = partial(training.train, validation_episodes=2, test_episodes=2)
     monkeypatch.setattr(training, "train", trained)
     return tmp_path
