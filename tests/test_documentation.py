@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 import usm_baselines
 from markdown_it import MarkdownIt
+from support.trainings import brief, shorten
 from usm_agents.artifact.folder import PRETRAINED
 from usm_agents.learning import training
-from usm_agents.learning.plan import Plan
 
 import usm_gym
 from usm_cli import selection
@@ -78,11 +78,6 @@ def budgeted(line):
     return shlex.split(line, comments=True)[1:] + shlex.split(BUDGETS[name])
 
 
-def brief(scenario):
-    """The first two seconds of a scenario."""
-    return replace(scenario, duration=2.0, settle_time=0.5)
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder with the README, results, and the files that the pages tell a reader to save."""
@@ -94,11 +89,12 @@ def folder(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "results", tmp_path / "results")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
-    few = {name: scenarios[:2] for name, scenarios in leaderboard.suites().items()}
+    few = {name: [*map(brief, frozen[:2])] for name, frozen in leaderboard.suites().items()}
     monkeypatch.setattr(leaderboard, "suites", lambda: few)
-    sampled, unseen = Plan.scenario, selection.unseen
-    monkeypatch.setattr(Plan, "scenario", lambda *given: brief(sampled(*given)))
+    shorten(monkeypatch)
+    unseen, suite = selection.unseen, selection.suite
     monkeypatch.setattr(selection, "unseen", lambda *given: [*map(brief, unseen(*given))])
+    monkeypatch.setattr(selection, "suite", lambda *given: [*map(brief, suite(*given))])
     trained = partial(training.train, validation_episodes=2, test_episodes=2)
     monkeypatch.setattr(training, "train", trained)
     return tmp_path

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.regression import SETTINGS, Regression
+from support.trainings import shorten
 from usm_agents.artifact.folder import read_agent
 from usm_agents.artifact.network import Network
 from usm_agents.learning import learner
@@ -49,7 +50,8 @@ def without_times(value):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stops", [(0,), (1100, 1100, 3000)])
-def test_it_goes_on_as_if_it_had_not_been_stopped(stops, tmp_path):
+def test_it_goes_on_as_if_it_had_not_been_stopped(stops, tmp_path, monkeypatch):
+    shorten(monkeypatch)
     train(PLAN, tmp_path / "whole", silent, **SMALL)
     for number, stop in enumerate(stops):
 
@@ -105,6 +107,7 @@ def test_the_command_trains_a_learner_of_ones_own_and_resumes_it(forget, monkeyp
     def not_installed(*arguments):
         raise UsageError("the extra is missing")
 
+    shorten(monkeypatch)
     monkeypatch.setattr(commands_train, "check_installed", not_installed)
     chosen = ["--algorithm", "my_module:mine", "--steps", "256", "--output", "agent"]
     main(["train", *chosen])
@@ -162,6 +165,7 @@ def as_lists(value):
 
 @pytest.mark.slow
 def test_the_truth_reaches_the_learner_and_nobody_else(tmp_path, monkeypatch):
+    shorten(monkeypatch)
     told, networks = [], []
     for force in (1.5, -2.5):
         truth = {"disturbance": np.full((SETTINGS["robots"], 2), force)}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.trainings import shorten
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from usm_agents.artifact.folder import make_agent
 from usm_agents.learning import training
@@ -31,7 +32,9 @@ def silent(steps, line):
 
 
 @pytest.fixture(autouse=True)
-def few_robots(monkeypatch):
+def small(monkeypatch):
+    """Few robots, episodes of two seconds: they end within the training."""
+    shorten(monkeypatch)
     for algorithm, settings in SETTINGS.items():
         monkeypatch.setitem(settings, "robots", 16 if algorithm == "ppo" else 4)
 

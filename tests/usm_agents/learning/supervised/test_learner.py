@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 import usm_baselines
+from support.trainings import brief, shorten
 from usm_agents.artifact.folder import make_agent, read_agent
 from usm_agents.learning import training
 from usm_agents.learning.checkpoint import latest_checkpoint
@@ -39,12 +40,7 @@ def small(monkeypatch):
     monkeypatch.setitem(SETTINGS, "estimator", SETTINGS["estimator"])
     for name, value in few.items():
         monkeypatch.setitem(SETTINGS["estimator"], name, value)
-    sampled = Plan.scenario
-    monkeypatch.setattr(
-        Plan,
-        "scenario",
-        lambda plan, random: replace(sampled(plan, random), duration=2.0, settle_time=0.5),
-    )
+    shorten(monkeypatch)
 
 
 @pytest.mark.slow
@@ -67,8 +63,7 @@ def test_a_training_that_is_stopped_goes_on_bit_for_bit(tmp_path):
     agents = [read_agent(tmp_path / name) for name in ("whole", "stopped")]
     assert agents[0][0].weights == agents[1][0].weights
     # A network that corrects nothing, as before the first round, is the base.
-    scenarios = [named("nominal", "operation", PRESETS["basin"])]
-    scenarios = [replace(each, duration=2.0, settle_time=0.5) for each in scenarios]
+    scenarios = [brief(named("nominal", "operation", PRESETS["basin"]))]
     corrected = rollout(make_agent(scenarios[0].nominal, str(tmp_path / "whole")), scenarios)[0]
     base = rollout(usm_baselines.make("lqg-joints", scenarios[0].nominal), scenarios)[0]
     assert np.abs(corrected.error - base.error).max() < 0.05
