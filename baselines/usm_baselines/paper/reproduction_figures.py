@@ -56,6 +56,8 @@ STYLE: Any = {
 }
 # A line is drawn through the smallest and largest number in each of so many intervals.
 INTERVALS = 300
+# Digits of a place after the second decimal.
+SURPLUS = re.compile(r"(\.\d\d)\d+")
 
 
 def draw(names: Sequence[str], result: ReproductionResult, records: Records, folder: Path) -> None:
@@ -104,8 +106,9 @@ def save(figure: Any, path: Path) -> None:
     drawn = io.StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
     plt.close(figure)
-    # A hundredth of a point is fine enough, and makes a small file.
-    write_text(path.with_suffix(".svg"), re.sub(r"(\.\d\d)\d+", r"\1", drawn.getvalue()))
+    # A hundredth of a point is fine enough for a line, and makes a small file.
+    short = re.sub(r' d="[^"]+"', lambda way: SURPLUS.sub(r"\1", way[0]), drawn.getvalue())
+    write_text(path.with_suffix(".svg"), short)
 
 
 def link_ends(record: Record, sample: int, robot: Robot) -> Array:
