@@ -24,7 +24,8 @@ def swimming_timing(name: str, id: str, steps: int) -> Timing:
     """Time the same with a policy that decides in every step."""
     env = gym.make(OPERATION)
     policy = make(id, env)
-    (observation, _), state = env.reset(seed=0), None
+    observation, _ = env.reset(seed=0)
+    state: Any = None
 
     def run() -> None:
         nonlocal observation, state
@@ -32,7 +33,8 @@ def swimming_timing(name: str, id: str, steps: int) -> Timing:
             action, state = policy.predict(observation, state)
             observation, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
-                (observation, _), state = env.reset(), None
+                observation, _ = env.reset()
+                state = None
 
     return Timing(name, run, steps)
 
@@ -51,7 +53,9 @@ def swimming_vector_timing(name: str, id: str, size: int, steps: int) -> Timing:
     """Time whole steps of the vector environment with a policy that decides, per robot."""
     envs = _vector_env(size, autoreset_mode="SameStep")
     policy = make(id, envs)
-    (observation, _), state, ended = envs.reset(seed=0), None, None
+    observation, _ = envs.reset(seed=0)
+    state: Any = None
+    ended: Any = None
 
     def run() -> None:
         nonlocal observation, state, ended
