@@ -1,11 +1,16 @@
 """Draws the pictures of the pages anew: `python docs/draw.py`."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import usm_baselines
 
+import usm_gym
+from usm_gym.evaluation import rollout
 from usm_gym.rendering.figure import robot_drawing
-from usm_gym.rendering.svg import arrow, box, document, group, text
+from usm_gym.rendering.svg import arrow, box, document, group, line, text
 from usm_gym.robot import Robot
 from usm_gym.task.conditions import FIELD
 
@@ -68,8 +73,8 @@ def _block(row: int, column: int, colour: str, name: str, *words: str) -> str:
     corner = np.array([COLUMNS[column], ROWS[row]])
     x = BLOCK[0] / 2
     marks = [text(name, corner, (x, 26), "title", anchor="middle", halo="")]
-    for k, line in enumerate(words):
-        marks.append(text(line, corner, (x, 49 + 20 * k), "small", anchor="middle", halo=""))
+    for k, said in enumerate(words):
+        marks.append(text(said, corner, (x, 49 + 20 * k), "small", anchor="middle", halo=""))
     return group(name.lower(), box("card", corner, BLOCK, colour), *marks)
 
 
@@ -98,7 +103,67 @@ def _signals() -> list[str]:
     ]
 
 
-DRAWINGS = {"robot.svg": lambda: robot_drawing(Robot()), "control_loop.svg": control_loop}
+# The panels of `joint_motion`: left and right side, their tops, height, and points of a line.
+SIDES, TOPS, HEIGHT, POINTS = (66.0, 616.0), (54.0, 196.0), 116.0, 250
+
+
+def joint_motion() -> str:
+    """Draw what the joints do to the centre of mass: an episode with them still and moving."""
+    moving = usm_gym.suite("operation")[0]
+    still = replace(moving, conditions=replace(moving.conditions, motion=False))
+    policy = usm_baselines.make("lqg-tuned", moving.nominal)
+    runs = dict(zip(("error", "quiet"), rollout(policy, [moving, still]), strict=True))
+    reach = np.ceil(max(1e3 * np.abs(run.error).max() for run in runs.values()))
+    marks = [_frames(moving, reach)]
+    for name, run in runs.items():
+        for k, top in enumerate(TOPS):
+            heights = top + HEIGHT / 2 * (1 - 1e3 * run.error[:, k] / reach)
+            places = np.interp(run.time, (0.0, moving.duration), SIDES)
+            marks.append(line(name, _extremes(places, heights), 1.4))
+    description = (
+        "The same episode twice, with the controller lqg-tuned. Joints that stay still leave an "
+        "error of the centre of mass near zero; joints that move push it off at every motion."
+    )
+    return document((640, 356), "What moving joints do to the centre of mass", description, marks)
+
+
+def _frames(scenario: usm_gym.Scenario, reach: float) -> str:
+    """Axes, the times when the joints start to move, and what the lines are."""
+    (left, right), bottom = SIDES, TOPS[-1] + HEIGHT
+    marks = [
+        text("joints move", (left, 34), name="error"),
+        text("joints stay still", (left, 34), (110, 0), name="quiet"),
+        text("dotted: joints start to move", (right, 34), (0, 0), "small", "ink", "end"),
+    ]
+    for top, axis in zip(TOPS, "xy", strict=True):
+        marks.append(text(f"error in *{axis}*, mm", (left, top), (6, 16), "small", "quiet"))
+        for share, value in ((0.0, reach), (0.5, 0.0), (1.0, -reach)):
+            height = top + share * HEIGHT
+            marks.append(line("rule", [(left, height), (right, height)], 1.0))
+            words = f"{value:g}".replace("-", "−")
+            marks.append(text(words, (left, height), (-8, 5), "small", "quiet", "end"))
+        for shift in scenario.shifts:
+            x = np.interp(shift, (0.0, scenario.duration), SIDES)
+            marks.append(line("ink", [(x, top), (x, top + HEIGHT)], 1.0, "2 4"))
+    for time in range(0, round(scenario.duration) + 1, 10):
+        x = np.interp(time, (0.0, scenario.duration), SIDES)
+        marks.append(text(f"{time} s", (x, bottom), (0, 24), "small", "quiet", "middle"))
+    return group("frames", *marks)
+
+
+def _extremes(x: np.ndarray, y: np.ndarray) -> Sequence[tuple[float, float]]:
+    """A line through the smallest and the largest height in every part of its way."""
+    kept: list[int] = []
+    for part in np.array_split(np.arange(len(y)), POINTS):
+        kept += sorted({int(part[y[part].argmin()]), int(part[y[part].argmax()])})
+    return [(x[k], y[k]) for k in kept]
+
+
+DRAWINGS = {
+    "robot.svg": lambda: robot_drawing(Robot()),
+    "control_loop.svg": control_loop,
+    "joint_motion.svg": joint_motion,
+}
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import gymnasium as gym
 import numpy as np
 from usm_baselines.paper.paper_rate import Law, simulate
 from usm_baselines.registry import make
@@ -205,47 +204,6 @@ def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
     return [scenarios[i % len(scenarios)] for i in range(size)]
 
 
-def vector_timing(name: str, size: int, steps: int, threads: int = 1) -> Timing:
-    """Time whole steps of the vector environment, per robot, within episodes.
-
-    `start_timing` times the starts of episodes, whose number depends on the policy.
-    """
-    envs = gym.make_vec(
-        "usm_gym:USM-Operation-v0",
-        num_envs=size,
-        vectorization_mode="vector_entry_point",
-        threads=threads,
-    )
-    options = {"scenario": resting(size, Conditions(current_limit=0.0), Robot())}
-    return _loop(name, envs, steps, size, options)
-
-
-def start_timing(name: str, size: int) -> Timing:
-    """Time starts of episodes in the vector environment: draw, noise, first observation; us."""
-    envs = gym.make_vec(
-        "usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="vector_entry_point"
-    )
-    envs.reset(seed=0)
-    return Timing(name, envs.reset, size, 1e6)
-
-
-def sync_timing(name: str, size: int, steps: int) -> Timing:
-    """Time whole steps of Gymnasium's `SyncVectorEnv` of single environments."""
-    envs = gym.make_vec("usm_gym:USM-Operation-v0", num_envs=size, vectorization_mode="sync")
-    return _loop(name, envs, steps, size)
-
-
-def cartpole_timing(name: str, size: int, steps: int) -> Timing:
-    """Time Gymnasium's CartPole vector environment, per robot."""
-    envs = gym.make_vec("CartPole-v1", num_envs=size, vectorization_mode="vector_entry_point")
-    return _loop(name, envs, steps, size)
-
-
-def swimmer_timing(name: str, steps: int) -> Timing:
-    """Time Gymnasium's Swimmer-v5; raises `ImportError` or a Gymnasium error without MuJoCo."""
-    return _loop(name, gym.make("Swimmer-v5"), steps, 1)
-
-
 def mujoco_timing(name: str, steps: int) -> Timing:
     """Time MuJoCo's C loop, Euler, on the same chain in ellipsoid fluid, if it is installed."""
     import mujoco
@@ -278,25 +236,6 @@ def mujoco_chain(robot: Robot) -> str:
     option = f'<option timestep="0.001" gravity="0 0 0" density="{robot.water_density}"/>'
     world = f"<worldbody><body>{root}{geom}{bodies}</body></worldbody>"
     return f"<mujoco>{option}{world}</mujoco>"
-
-
-def _loop(
-    name: str, env: Any, steps: int, size: int, options: dict[str, Any] | None = None
-) -> Timing:
-    env.reset(seed=0, options=options)
-    env.action_space.seed(0)
-    single = isinstance(env, gym.Env)
-    # Random actions of mean zero, as at the start of a training.
-    samples = [env.action_space.sample() for _ in range(10)]
-    actions = samples if env.action_space.dtype.kind == "i" else [*samples, *(-a for a in samples)]
-
-    def run() -> None:
-        for k in range(steps):
-            outcome = env.step(actions[k % len(actions)])
-            if single and (outcome[2] or outcome[3]):
-                env.reset()
-
-    return Timing(name, run, size * steps)
 
 
 def paper_rate() -> None:

@@ -8,6 +8,7 @@ from usm_gym.linear_model import LinearModel, linearise
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
+from usm_gym.statistics import compare
 from usm_gym.suites import suite
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import max_error
@@ -29,6 +30,7 @@ __all__ = [
     "Water",
     "Wave",
     "accelerations",
+    "compare",
     "evaluate",
     "linearise",
     "max_error",

@@ -1,18 +1,18 @@
 """Adds pages, results, notebooks and speed from the rest of the repository to the site."""
 
-import json
 from pathlib import Path
 
+import notebook_page
 from mkdocs.structure.files import File
 
 import usm_gym
-from usm_cli.commands.bench import MEANINGS
+from usm_cli.commands.bench import MEANINGS, findings
 from usm_cli.speed import SpeedResult
 from usm_gym.support.text import figures
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "results" / usm_gym.__version__
-SPEED = "<!-- bench.json -->"
+SPEED, FINDINGS = "<!-- bench.json -->", "<!-- bench.json: findings -->"
 
 
 def on_files(files, config):
@@ -24,26 +24,18 @@ def on_files(files, config):
     for place, path in outside.items():
         files.append(File.generated(config, place, abs_src_path=str(path)))
     for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
-        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook(path)))
+        for name, content in notebook_page.files(path, f"notebooks/{path.name}").items():
+            files.append(File.generated(config, f"notebooks/{name}", content=content))
     return files
-
-
-def notebook(path):
-    """A notebook as a page."""
-    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-    texts = [
-        "".join(cell["source"])
-        if cell["cell_type"] == "markdown"
-        else f"```python\n{''.join(cell['source'])}\n```"
-        for cell in cells
-    ]
-    source = f"From `{path.relative_to(ROOT).as_posix()}`, to be run cell by cell."
-    return "\n\n".join([texts[0], source, *texts[1:]])
 
 
 def on_page_markdown(markdown, **_):
     """Put the measured speed in its place."""
-    return markdown.replace(SPEED, speed(RESULTS / "bench.json")) if SPEED in markdown else markdown
+    if SPEED not in markdown:
+        return markdown
+    path = RESULTS / "bench.json"
+    said = findings(SpeedResult.read(path).spread) if path.exists() else []
+    return markdown.replace(FINDINGS, "\n\n".join(said)).replace(SPEED, speed(path))
 
 
 def speed(path):

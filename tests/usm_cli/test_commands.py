@@ -387,11 +387,13 @@ def test_reproduce_writes_the_same_bits_twice(tmp_path):
     assert commands[0] != commands[1]
     assert documents[0] == documents[1]
     assert set(documents[0]["rows"]["sta"]) == {"torpedo", "operation", "settled"}
-    for file in ("table1.md", "fig04.png", "fig07.png"):
+    for file in ("table1.md", "fig04.png", "fig04.svg", "fig07.png", "fig07.svg"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [
         "fig04.png",
+        "fig04.svg",
         "fig07.png",
+        "fig07.svg",
         "table1.json",
         "table1.md",
     ]

@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium as gym
 from rich.table import Table
 
+from usm_cli import environment_speed as environments
 from usm_cli import speed as benchmark
 from usm_cli.decisions import decision_times, policies
 from usm_cli.speed import (
@@ -28,6 +29,7 @@ from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures
 from usm_gym.support.validation import require
+from usm_gym.task.conditions import FIELD
 
 DESCRIPTION = """\
 Measure the speed on this machine. Figures and their peers are measured in the same run, in turns,
@@ -45,12 +47,30 @@ PEERS = {
     "vector_env_ratio_cartpole": ("cartpole_vector_env_step_ns", "vector_env_step_ns"),
     "second_thread_speedup": ("vector_env_step_ns", "vector_env_two_threads_step_ns"),
 }
+# The policy that decides where one does.
+POLICY = "sta"
+# Environment steps per second, and the cost of one that they follow from.
+RATES = {
+    "env_steps_per_s": "env_step_ns",
+    "env_policy_steps_per_s": "env_policy_step_ns",
+    "vector_env_steps_per_s": "vector_env_step_ns",
+    "vector_env_policy_steps_per_s": "vector_env_policy_step_ns",
+    "swimmer_v5_steps_per_s": "swimmer_v5_step_ns",
+}
 MEANINGS = {
+    "env_steps_per_s": "environment steps per second, one robot, `gym.make`, random thrust",
+    "env_policy_steps_per_s": f"the same with the policy {POLICY}",
+    "vector_env_steps_per_s": f"environment steps per second, {ROBOTS} robots, one thread, in all",
+    "vector_env_policy_steps_per_s": f"the same with the policy {POLICY}",
+    "swimmer_v5_steps_per_s": "the same of Gymnasium's Swimmer-v5, `gym.make`, random actions",
+    "env_step_ns": "environment step of one robot, `gym.make`, ns",
+    "env_policy_step_ns": f"the same with the policy {POLICY}, ns",
     "plant_step_ns": "physics step of one robot, ns",
     "batch_step_ns": f"physics step, {ROBOTS} robots, one thread, per robot, ns",
     "mujoco_step_ns": "MuJoCo, C loop, Euler, the same chain, ns",
     "vector_env_step_ns": f"environment step, {ROBOTS} robots, one thread, per robot, ns",
-    "vector_env_two_threads_step_ns": "the same on two threads, ns",
+    "vector_env_policy_step_ns": f"the same with the policy {POLICY}, ns",
+    "vector_env_two_threads_step_ns": f"environment step, {ROBOTS} robots, on two threads, ns",
     "episode_start_us": "start of an episode in the vector environment, us",
     "sync_vector_env_step_ns": "SyncVectorEnv of 8 of our environments, per robot, ns",
     "swimmer_v5_step_ns": "Gymnasium's Swimmer-v5, ns",
@@ -112,12 +132,16 @@ def run(arguments: argparse.Namespace) -> None:
     measured = {name: summarise(values) for name, values in times.items()}
     for step, error in benchmark.loop_errors().items():
         measured[f"step_{step}_error_nm"] = summarise([error])
+    for rate, cost in RATES.items():
+        if cost in times:
+            measured[rate] = summarise([1e9 / ns for ns in times[cost]])
     for ratio, (slow, fast) in PEERS.items():
         if slow in times:
             pairs = zip(times[slow], times[fast], strict=True)
             measured[ratio] = summarise([a / b for a, b in pairs])
     console = output_console()
     console.print(table(measured, missing))
+    console.print(*findings(measured), sep="\n\n")
     rows = list(benchmark.growth(min(rounds, 5))) if arguments.growth else []
     if rows:
         console.print(growth_table(rows))
@@ -142,14 +166,21 @@ def available() -> tuple[list[Timing], list[str]]:
         "plant_step_ns": lambda name: benchmark.plant_timing(name, 1, SINGLE_PERIOD),
         "batch_step_ns": lambda name: benchmark.plant_timing(name, ROBOTS, BATCH_PERIOD),
         "mujoco_step_ns": lambda name: benchmark.mujoco_timing(name, 2000),
-        "vector_env_step_ns": lambda name: benchmark.vector_timing(name, ROBOTS, 100),
-        "vector_env_two_threads_step_ns": lambda name: benchmark.vector_timing(
-            name, ROBOTS, 100, 2
+        "env_step_ns": partial(environments.single_timing, steps=500),
+        "env_policy_step_ns": partial(environments.swimming_timing, id=POLICY, steps=500),
+        "vector_env_step_ns": partial(environments.vector_timing, size=ROBOTS, steps=100),
+        "vector_env_policy_step_ns": partial(
+            environments.swimming_vector_timing, id=POLICY, size=ROBOTS, steps=100
         ),
-        "sync_vector_env_step_ns": lambda name: benchmark.sync_timing(name, 8, 50),
-        "episode_start_us": lambda name: benchmark.start_timing(name, 64),
-        "swimmer_v5_step_ns": lambda name: benchmark.swimmer_timing(name, 500),
-        "cartpole_vector_env_step_ns": lambda name: benchmark.cartpole_timing(name, ROBOTS, 200),
+        "vector_env_two_threads_step_ns": partial(
+            environments.vector_timing, size=ROBOTS, steps=100, threads=2
+        ),
+        "sync_vector_env_step_ns": partial(environments.sync_timing, size=8, steps=50),
+        "episode_start_us": partial(environments.start_timing, size=64),
+        "swimmer_v5_step_ns": partial(environments.swimmer_timing, steps=500),
+        "cartpole_vector_env_step_ns": partial(
+            environments.cartpole_timing, size=ROBOTS, steps=200
+        ),
         **{
             f"step_{step}_second_us": partial(benchmark.second_timing, step=size)
             for step, size in STEPS.items()
@@ -186,6 +217,32 @@ def table(measured: dict[str, Figure], missing: list[str]) -> Table:
         elif name in missing:
             rows.add_row(name, f"{meaning}: not installed (the extra bench)")
     return rows
+
+
+def findings(measured: Mapping[str, Figure]) -> list[str]:
+    """What the figures say of environment steps, in sentences; of those that were measured."""
+    rates = {name: measured[name].median for name in RATES if name in measured}
+    said = []
+    if {"env_steps_per_s", "env_policy_steps_per_s"} <= set(rates):
+        said.append(
+            f"One robot makes {rounded(rates['env_steps_per_s'])} environment steps per second "
+            "through `gym.make`, on one core, and "
+            f"{rounded(rates['env_policy_steps_per_s'])} with `{POLICY}` as its policy."
+        )
+    if {"vector_env_steps_per_s", "vector_env_policy_steps_per_s"} <= set(rates):
+        alone = rates["vector_env_steps_per_s"]
+        said.append(
+            f"{ROBOTS} robots side by side make {rounded(alone)} through `gym.make_vec`, on one "
+            f"core, and {rounded(rates['vector_env_policy_steps_per_s'])} with `{POLICY}`: "
+            f"{rounded(alone * FIELD.substeps)} physics steps per second, or "
+            f"{rounded(alone * FIELD.control_period)} times real time."
+        )
+    return said
+
+
+def rounded(rate: float) -> str:
+    """Write a rate with two significant figures: 8,700."""
+    return f"{float(f'{rate:.2g}'):,.0f}"
 
 
 def growth_table(rows: list[Growth]) -> Table:

@@ -100,11 +100,11 @@ def run_table(folder: Path | None, step: float, names: list[str]) -> None:
     write_text(folder / "table1.md", markdown(result))
     from usm_baselines.paper.reproduction_figures import draw
 
-    draw(names, records, folder)
+    draw(names, result, records, folder)
 
 
 def run_study(folder: Path) -> None:
-    """Run the sensitivity study, write study.json and study.png."""
+    """Run the sensitivity study, write study.json, study.png and study.svg."""
     from usm_baselines.paper.sensitivity import study, trials
     from usm_baselines.paper.sensitivity_figure import draw_study
 
@@ -116,7 +116,7 @@ def run_study(folder: Path) -> None:
             lambda done, total: bar.update(line, completed=done, total=total),
             trials(),
         )
-    draw_study(result, folder / "study.png")
+    draw_study(result, folder / "study")
 
 
 def run_fit(folder: Path) -> None:

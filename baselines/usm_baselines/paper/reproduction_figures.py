@@ -1,7 +1,9 @@
-"""Figures 3 to 10 of the paper and one of its theorem, from our runs (needs `render`)."""
+"""Table 1, figures 3 to 10 and the theorem of the paper, from our runs (needs `render`)."""
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,20 @@ import numpy as np
 from usm_baselines.laws.super_twisting import SuperTwistingGains
 from usm_baselines.paper.convergence import Start, cascade, disturbance_rate, growth
 from usm_baselines.paper.paper_rate import Array, Law, Record, simulate
-from usm_baselines.paper.reproduction import AXES, IMPLICIT_STEP, SAMPLE_TIME, at_step
+from usm_baselines.paper.reproduction import (
+    AXES,
+    IMPLICIT_STEP,
+    PAPER,
+    PARTS,
+    PRINTED,
+    SAMPLE_TIME,
+    ReproductionResult,
+    at_step,
+)
+from usm_gym.rendering.look import ERROR_COLOURS
 from usm_gym.robot import Robot
+from usm_gym.support.files import write_text
+from usm_gym.support.text import figures
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import named
 
@@ -29,19 +43,38 @@ CAPTIONS = {
     "fig09": ("Operation mode: PD controller", "pd", "operation"),
     "fig10": ("Operation mode: position error of the PD controller", "pd", "operation"),
 }
+NAMES = ("table1", *CAPTIONS, "theorem1")
+COLOURS = [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in ERROR_COLOURS]
+# An equal seed makes equal files.
+STYLE: Any = {
+    "svg.hashsalt": "usm-gym",
+    "svg.fonttype": "none",
+    "font.size": 9,
+    "legend.frameon": False,
+    # Of Okabe and Ito, to be told apart by all eyes.
+    "axes.prop_cycle": "cycler('color', ['#0072b2', '#d55e00', '#009e73', '#cc79a7'])",
+}
+# A line is drawn through the smallest and largest number in each of so many intervals.
+INTERVALS = 300
+# Digits of a place after the second decimal.
+SURPLUS = re.compile(r"(\.\d\d)\d+")
 
 
-NAMES = (*CAPTIONS, "theorem1")
+def draw(names: Sequence[str], result: ReproductionResult, records: Records, folder: Path) -> None:
+    """Draw figures into a folder, as PNG and SVG.
 
-
-def draw(names: Sequence[str], records: Records, folder: Path) -> None:
-    """Draw figures into a folder; PNG."""
+    Args:
+        names: Some of `NAMES`.
+        result: The table.
+        records: The runs behind it, by row and mode.
+        folder: Where to write.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    drawers: dict[str, Callable[[Record, str], Any]] = {
+    drawers: dict[str, Callable[[Record, str, str], Any]] = {
         "fig03": _bodies,
         "fig04": _bodies,
         "fig05": _signals,
@@ -51,16 +84,31 @@ def draw(names: Sequence[str], records: Records, folder: Path) -> None:
         "fig09": _signals,
         "fig10": _errors,
     }
-    for name in names:
-        if name == "theorem1":
-            figure = _theorem(records)
-        else:
-            caption, row, mode = CAPTIONS[name]
-            figure = drawers[name](records[row, mode], row)
-            number = int(name[3:])
-            figure.suptitle(f"{caption} (our run, to lay beside Fig. {number})", fontsize=11)
-        figure.savefig(folder / f"{name}.png", dpi=120, metadata={"Software": None})
-        plt.close(figure)
+    with plt.rc_context(STYLE):
+        for name in names:
+            if name == "table1":
+                figure = _table(result)
+            elif name == "theorem1":
+                figure = _theorem(records)
+            else:
+                caption, row, mode = CAPTIONS[name]
+                figure = drawers[name](records[row, mode], row, mode)
+                number = int(name[3:])
+                figure.suptitle(f"{caption} (our run, to lay beside Fig. {number})", fontsize=10)
+            save(figure, folder / name)
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure as PNG and SVG, and forget it; `path` lacks the ending."""
+    from matplotlib import pyplot as plt
+
+    figure.savefig(path.with_suffix(".png"), dpi=120, metadata={"Software": None})
+    drawn = io.StringIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    plt.close(figure)
+    # A hundredth of a point is fine enough for a line, and makes a small file.
+    short = re.sub(r' d="[^"]+"', lambda way: SURPLUS.sub(r"\1", way[0]), drawn.getvalue())
+    write_text(path.with_suffix(".svg"), short)
 
 
 def link_ends(record: Record, sample: int, robot: Robot) -> Array:
@@ -73,15 +121,72 @@ def link_ends(record: Record, sample: int, robot: Robot) -> Array:
     return np.asarray(ends - centres.mean(axis=0) + position)
 
 
-def _bodies(record: Record, row: str) -> Any:
+def thinned(time: Array, values: Array) -> tuple[Array, Array]:
+    """The extremes of a signal in each of `INTERVALS` intervals, in their order.
+
+    Args:
+        time: Times, s, (samples,).
+        values: The signal, (samples,).
+
+    Returns:
+        Times and values, (at most 2 `INTERVALS` + 2,) each; a peak keeps its height.
+    """
+    kept = {0, len(values) - 1}
+    for part in np.array_split(np.arange(len(values)), INTERVALS):
+        if len(part):
+            kept |= {part[values[part].argmin()], part[values[part].argmax()]}
+    chosen = np.array(sorted(kept))
+    return time[chosen], values[chosen]
+
+
+def _table(result: ReproductionResult) -> Any:
+    """Our errors beside the printed ones, a panel for each row of the paper."""
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(9, 2.4), layout="constrained")
-    position = record.reference + record.error
-    axes.plot(
-        *record.reference.T, "--", color="k", linewidth=1, label="reference of the CM", zorder=4
+    places = [(part, axis) for part in PARTS for axis in result.axes]
+    size = 6.4, 0.3 * len(places) + 1.2
+    figure, panels = plt.subplots(
+        1, len(result.paper), figsize=size, sharex=True, sharey=True, layout="constrained"
     )
-    axes.plot(*position.T, color="C3", linewidth=1.5, label="CM", zorder=3)
+    for panel, (theirs, printed) in zip(panels, result.paper.items(), strict=True):
+        rows = [row for row, other in PRINTED.items() if other == theirs and row in result.rows]
+        for row, marker, colour in zip(rows, "o^", COLOURS, strict=False):
+            ours = [1e3 * result.rows[row][part][axis] for part, axis in places]
+            panel.plot(ours, range(len(places)), marker, color=colour, markersize=5, label=row)
+        for place, (part, axis) in enumerate(places):
+            ends = 1e3 * printed[part][axis], 1e3 * result.rows[theirs][part][axis]
+            panel.plot(ends, (place, place), color="0.75", linewidth=2, zorder=0)
+            ratio = f"× {figures(ends[1] / ends[0])}"
+            panel.annotate(
+                ratio,
+                (1, place),
+                (-3, 0),
+                xycoords=("axes fraction", "data"),
+                textcoords="offset points",
+                ha="right",
+                va="center",
+                fontsize=7,
+            )
+        numbers = [1e3 * printed[part][axis] for part, axis in places]
+        panel.plot(numbers, range(len(places)), "D", color="k", fillstyle="none", label="paper")
+        panel.set(xscale="log", xlabel="largest position error [mm]")
+        panel.xaxis.set_major_formatter(lambda value, place: f"{value:g}")
+        panel.legend(fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+        _plain(panel)
+    low, high = panels[0].get_xlim()
+    panels[0].set(xlim=(low, 8 * high), ylim=(len(places) - 0.5, -0.5))
+    panels[0].set_yticks(range(len(places)), [f"{part} {axis}" for part, axis in places])
+    return figure
+
+
+def _bodies(record: Record, row: str, mode: str) -> Any:
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 1.9), layout="constrained")
+    position = record.reference + record.error
+    path = record.reference[::100]
+    axes.plot(*path.T, "--", color="k", linewidth=1, label="reference", zorder=4)
+    axes.plot(*position[::100].T, color="0.5", linewidth=2.5, label="centre of mass", zorder=3)
     times = (0.0, 9.0, 15.0, 25.0, 39.0)
     for number, time in enumerate(times):
         sample = int(np.searchsorted(record.time, time))
@@ -90,68 +195,98 @@ def _bodies(record: Record, row: str) -> Any:
         axes.plot(*ends.T, color=colour, linewidth=3, solid_capstyle="round", label=f"{time:g} s")
         axes.plot(*ends[-1], "o", color=colour, markersize=6)
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    figure.legend(fontsize=8, ncols=7, loc="outside lower center")
+    _plain(axes)
+    figure.legend(fontsize=7, ncols=7, columnspacing=1, loc="outside lower center")
     return figure
 
 
-def _signals(record: Record, row: str) -> Any:
+def _signals(record: Record, row: str, mode: str) -> Any:
+    """Position, its error, for the STA the sliding variable, control input, observer error."""
     from matplotlib import pyplot as plt
 
-    figure, panels = plt.subplots(4, 1, figsize=(8, 9), sharex=True, layout="constrained")
-    position = record.reference + record.error
-    for axis, name in enumerate(AXES):
-        colour = f"C{axis}"
-        panels[0].plot(record.time, position[:, axis], color=colour, label=f"$p_{name}$")
-        panels[0].plot(
-            record.time,
-            record.reference[:, axis],
-            "--",
-            color="k",
-            linewidth=0.8,
-            label=f"$p_{{{name},ref}}$",
-        )
-        second = record.sigma if row == "sta" else 1e3 * record.error
-        panels[1].plot(record.time, second[:, axis], color=colour, linewidth=0.8, label=name)
-        panels[2].plot(record.time, record.force[:, axis], color=colour, label=name)
-        panels[3].plot(record.time, record.observer_error[:, axis], color=colour, label=name)
-    panels[0].set(ylabel="position [m]")
-    if row == "sta":
-        panels[1].set(ylabel=r"$\hat\sigma$ [m/s]")
-    else:
-        panels[1].set(ylabel="position error [mm]")
-    panels[2].set(ylabel="control input $F_{CM}$ [N]")
-    panels[3].set(ylabel="observer error $e_1$ [m]", xlabel="time [s]")
+    shown = {
+        "position [m]": record.reference + record.error,
+        "position error [mm]": 1e3 * record.error,
+        r"$\hat\sigma$ [mm/s]": 1e3 * record.sigma,
+        "control input [N]": record.force,
+        "observer error [µm]": 1e6 * record.observer_error,
+    }
+    if row != "sta":
+        del shown[r"$\hat\sigma$ [mm/s]"]
+    size = 6.4, 1.5 * len(shown) + 0.6
+    figure, panels = plt.subplots(len(shown), figsize=size, sharex=True, layout="constrained")
+    for panel, (label, signal) in zip(panels, shown.items(), strict=True):
+        for axis, name in enumerate(AXES):
+            curve = thinned(record.time, signal[:, axis])
+            panel.plot(*curve, color=COLOURS[axis], linewidth=0.8, label=name)
+        panel.set(ylabel=label)
+        _plain(panel)
+    for axis in range(len(AXES)):
+        reference = thinned(record.time, record.reference[:, axis])
+        panels[0].plot(*reference, "--", color="k", linewidth=0.8, label="reference")
+        _printed(panels[1], row, mode, axis, COLOURS[axis])
+    figure.legend(*_legend(panels[:2]), fontsize=8, ncols=5, loc="outside lower center")
+    panels[-1].set(xlabel="time [s]", xlim=(0, record.time[-1]))
+    figure.align_ylabels()
+    return figure
+
+
+def _errors(record: Record, row: str, mode: str) -> Any:
+    """The position error, a panel for each axis."""
+    from matplotlib import pyplot as plt
+
+    size = 6.4, 1.9 * len(AXES) + 0.4
+    figure, panels = plt.subplots(len(AXES), figsize=size, sharex=True, layout="constrained")
+    for axis, (name, panel) in enumerate(zip(AXES, panels, strict=True)):
+        curve = thinned(record.time, 1e3 * record.error[:, axis])
+        panel.plot(*curve, color=COLOURS[axis], linewidth=0.8, label="ours")
+        _printed(panel, row, mode, axis, "k")
+        panel.set(ylabel=f"error in {name} [mm]")
+        _plain(panel)
+    figure.legend(*_legend(panels), fontsize=8, ncols=3, loc="outside lower center")
+    panels[-1].set(xlabel="time [s]", xlim=(0, record.time[-1]))
+    figure.align_ylabels()
+    return figure
+
+
+def _legend(panels: Sequence[Any]) -> tuple[list[Any], list[str]]:
+    """What the lines of some panels mean, each meaning once."""
+    meanings: dict[str, Any] = {}
     for panel in panels:
-        panel.grid(alpha=0.3)
-        panel.legend(fontsize=8, ncols=4, loc="upper left")
-    return figure
+        for line, words in zip(*panel.get_legend_handles_labels(), strict=True):
+            meanings.setdefault(words, line)
+    return list(meanings.values()), list(meanings)
 
 
-def _errors(record: Record, row: str) -> Any:
-    from matplotlib import pyplot as plt
+def _printed(panel: Any, row: str, mode: str, axis: int, colour: str) -> None:
+    """The largest errors that the paper prints for a run, on both sides of 0, mm."""
+    parts = [part for part, other in PARTS.items() if other == mode]
+    for part, style in zip(parts, ("--", ":"), strict=False):
+        error = 1e3 * PAPER[row][part][AXES[axis]]
+        label = "largest, paper" if part == mode else f"{part}, paper"
+        for side, words in ((error, label), (-error, "_")):
+            panel.axhline(side, color=colour, linestyle=style, linewidth=0.9, label=words)
 
-    size = 8, 2.5 * len(AXES)
-    figure, panels = plt.subplots(len(AXES), 1, figsize=size, sharex=True, layout="constrained")
-    for axis, name in enumerate(AXES):
-        panels[axis].plot(record.time, 1e3 * record.error[:, axis], color=f"C{axis}")
-        panels[axis].set(ylabel=f"error in {name} [mm]")
-        panels[axis].grid(alpha=0.3)
-    panels[-1].set(xlabel="time [s]")
-    return figure
+
+def _plain(panel: Any) -> None:
+    """Draw no more lines than a reader needs."""
+    panel.grid(alpha=0.25, linewidth=0.5)
+    panel.spines[["top", "right"]].set_visible(False)
 
 
 def _theorem(records: Records) -> Any:
     from matplotlib import pyplot as plt
 
-    figure, panels = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
+    figure, panels = plt.subplots(2, 2, figsize=(8.4, 6.8), layout="constrained")
     _observer_region(panels[0, 0])
     _sliding(panels[0, 1])
     _decay(panels[1, 0])
     _disturbances(panels[1, 1], records)
     for panel in panels.flat:
-        panel.grid(alpha=0.3)
-        panel.legend(fontsize=8)
-    figure.suptitle("Theorem 1 with the printed gains (our runs)", fontsize=11)
+        panel.title.set_fontsize(9)
+        panel.legend(fontsize=7)
+        _plain(panel)
+    figure.suptitle("Theorem 1 with the printed gains (our runs)", fontsize=10)
     return figure
 
 
@@ -181,7 +316,7 @@ def _sliding(panel: Any) -> None:
     )
     for sigma, chosen, name in runs:
         trace = cascade(chosen, Start(sigma=sigma), 3.0)
-        panel.plot(trace.time[::20], np.abs(trace.sigma[::20]), linewidth=1, label=name)
+        panel.plot(*thinned(trace.time, np.abs(trace.sigma)), linewidth=1, label=name)
     panel.set(
         yscale="log",
         ylim=(1e-9, 3.0),
@@ -201,12 +336,8 @@ def _decay(panel: Any) -> None:
             rate * gains.observer_gain,
             (-0.92, 0.39),
         )
-        panel.plot(
-            trace.time[::20],
-            np.abs(trace.error[::20]),
-            linewidth=1,
-            label=rf"$|\dot F|$ = {rate:g} L",
-        )
+        curve = thinned(trace.time, np.abs(trace.error))
+        panel.plot(*curve, linewidth=1, label=rf"$|\dot F|$ = {rate:g} L")
     time = np.array([1.0, 8.0])
     panel.plot(time, 0.3 * np.exp(-time), "k--", linewidth=0.8, label=r"$e^{-\lambda t}$")
     panel.set(
@@ -226,12 +357,13 @@ def _disturbances(panel: Any, records: Records) -> None:
         (filtered, "filtered joint references (nominal)"),
     )
     for record, name in shown:
-        rate = disturbance_rate(record)
-        panel.plot(record.time[1:], np.maximum(rate, 1e-4), linewidth=0.8, label=name)
+        curve = thinned(record.time[1:], np.maximum(disturbance_rate(record), 1e-4))
+        panel.plot(*curve, linewidth=0.8, label=name)
     panel.axhline(L, color="k", linestyle=":", label="L")
     panel.set(
         yscale="log",
         xlabel="time [s]",
+        ylim=(None, 1e7),
         ylabel=r"$|\dot F|$ over 1 ms [m/s$^3$]",
         title="what the joints make",
     )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from usm_baselines.paper.reproduction import PAPER, PARTS
+from usm_baselines.paper.reproduction_figures import STYLE, save
 from usm_baselines.paper.sensitivity import (
     PERIODS,
     ROWS,
@@ -25,7 +26,7 @@ def draw_study(study: SensitivityResult, path: Path) -> None:
 
     Args:
         study: The study.
-        path: Where to write the PNG.
+        path: Where to write PNG and SVG; it lacks the ending.
     """
     import matplotlib
 
@@ -33,16 +34,18 @@ def draw_study(study: SensitivityResult, path: Path) -> None:
     from matplotlib import pyplot as plt
 
     sheet = Sheet(study)
-    figure = plt.figure(figsize=(20, 13), layout="constrained")
-    grid = figure.add_gridspec(2, 4, width_ratios=(1.25, 1.25, 1, 1))
-    sheet.numbers(figure.add_subplot(grid[:, :2]))
-    sheet.oscillation(figure.add_subplot(grid[0, 2]))
-    sheet.peaks(figure.add_subplot(grid[0, 3]))
-    sheet.readings(figure.add_subplot(grid[1, 2]))
-    sheet.rates(figure.add_subplot(grid[1, 3]))
-    figure.suptitle("What the open items of the paper do to its Table 1 (our runs)", fontsize=14)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    plt.close(figure)
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(20, 13), layout="constrained")
+        grid = figure.add_gridspec(2, 4, width_ratios=(1.25, 1.25, 1, 1))
+        sheet.numbers(figure.add_subplot(grid[:, :2]))
+        sheet.oscillation(figure.add_subplot(grid[0, 2]))
+        sheet.peaks(figure.add_subplot(grid[0, 3]))
+        sheet.readings(figure.add_subplot(grid[1, 2]))
+        sheet.rates(figure.add_subplot(grid[1, 3]))
+        figure.suptitle(
+            "What the open items of the paper do to its Table 1 (our runs)", fontsize=14
+        )
+        save(figure, path)
 
 
 class Sheet:

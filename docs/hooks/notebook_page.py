@@ -1,0 +1,30 @@
+"""Turns a notebook into a page and its pictures."""
+
+import base64
+import json
+
+
+def files(path, source):
+    """The page of a notebook and its pictures, by their names.
+
+    Args:
+        path: The notebook.
+        source: Where a reader finds it.
+    """
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    pictures, blocks = {}, []
+    for cell in cells:
+        words = "".join(cell["source"])
+        blocks.append(words if cell["cell_type"] == "markdown" else f"```python\n{words}\n```")
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {"text/plain": output.get("text", [])})
+            if "image/png" in data:
+                name = f"{path.stem}-{cell['id']}.png"
+                pictures[name] = base64.b64decode("".join(data["image/png"]))
+                blocks.append(f"![{cell['metadata']['alt']}]({name})")
+            elif "text/markdown" in data:
+                blocks.append("".join(data["text/markdown"]))
+            else:
+                blocks.append(f"```text\n{''.join(data['text/plain']).rstrip()}\n```")
+    blocks.insert(1, f"From `{source}`, with what it found when it was run.")
+    return {f"{path.stem}.md": "\n\n".join(blocks), **pictures}
