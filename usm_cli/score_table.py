@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
-from usm_baselines.benchmark.leaderboard import Standing
+from usm_baselines.benchmark.leaderboard import Standing, ranks
 from usm_baselines.benchmark.leaderboard_page import MARK, rank_labels
 from usm_baselines.benchmark.results import (
     Scores,
@@ -34,7 +34,8 @@ LEGEND = """\
 error: largest position error after settling, {axes} added up, mean ± half of its 95 % interval; \
 N/s: how much the thrust varies; lost: robots, each of which counts {loss} mm or more. \
 Order: the objective, which is the error plus {attitude} mm per degree of heading error and \
-{variation} mm per N/s. Rows that the data do not tell apart share a rank (=)."""
+{variation} mm per N/s. Rows share a rank (=) until the data tell one from the first \
+of them."""
 UNRANKED = "Rows without a rank are no competitors: they are told more than a vehicle knows."
 # What a lost robot counts at least, mm.
 LOSS = round(1e3 * LOST_ERROR)
@@ -65,11 +66,9 @@ class Column:
 
 def table(rows: Mapping[str, Standing], console: Console) -> Table:
     """The scores, best first, in as many columns as the console has room for."""
-    best = [row.rank for row in rows.values()].count(1)
-    styles = [
-        "dim" if row.rank is None else "bold" if row.rank == 1 and best < len(rows) else ""
-        for row in rows.values()
-    ]
+    places = list(ranks(rows).values())
+    alone = places.count(1) < len(rows)
+    styles = ["dim" if rank is None else "bold" if rank == 1 and alone else "" for rank in places]
     return _fitted(columns_of(rows), console, styles)
 
 
@@ -152,7 +151,8 @@ def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np
             f"{counted(episodes, 'scenario')} cannot say who wins; it takes {FEWEST_EPISODES}."
         )
     # By the rule of ranks, the data tell a row from the first unless it shares its rank.
-    tied = [name for name in others if rows[name].rank == best.rank]
+    places = ranks(rows)
+    tied = [name for name in others if places[name] == places[first]]
     beaten = [name for name in others if name not in tied]
     open_ = f"the data do not tell it from {_some(tied)}" if tied else ""
     if not beaten:

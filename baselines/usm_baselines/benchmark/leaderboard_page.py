@@ -14,8 +14,10 @@ from usm_baselines.benchmark.leaderboard import (
     LeaderboardResult,
     Standing,
     crossed,
+    ranks,
 )
 from usm_baselines.benchmark.results import (
+    CompetitorScores,
     Summary,
     attitude_in,
     axes_in,
@@ -41,8 +43,8 @@ Largest position error after settling, mm: mean over the episodes with its 95 % 
 the middle half of the episodes, worst episode; root mean square, mm; largest heading error, °.
 "Told" is what a policy knows besides the measured position and the reference. Rows are ordered by
 the objective by which gains and agents are chosen: the means in {axes} added up, plus {attitude} mm
-per degree of heading error and {variation} mm per N/s of thrust variation. The rank of a row is the
-place of the first row from which the data do not tell it. "Beats the next" says whether the
+per degree of heading error and {variation} mm per N/s of thrust variation. Going down, rows share a
+rank (=) until the data tell one from the first of them. "Beats the next" says whether the
 interval of the paired difference to the next row leaves out 0, and with what probability an episode
 goes better. "Over informed" is a row's means over those of the law that is told what is constant in
 an episode: the distance that knowledge could close.
@@ -151,14 +153,15 @@ def cross_table(result: LeaderboardResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-def rank_labels(rows: Mapping[str, Standing]) -> dict[str, str]:
+def rank_labels(rows: Mapping[str, CompetitorScores]) -> dict[str, str]:
     """The rows' ranks as text, with "=" where several share one."""
-    shared = Counter(row.rank for row in rows.values())
+    found = ranks(rows)
+    shared = Counter(found.values())
 
     def label(rank: int | None) -> str:
         return "" if rank is None else f"{rank}=" if shared[rank] > 1 else str(rank)
 
-    return {id: label(row.rank) for id, row in rows.items()}
+    return {id: label(rank) for id, rank in found.items()}
 
 
 def in_short(lead: Lead) -> str:
@@ -232,8 +235,9 @@ def csv_text(result: LeaderboardResult) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(head)
     for suite, rows in result.suites.items():
+        places = ranks(rows)
         for id, row in rows.items():
-            line: list[object] = [suite, row.rank, id, row.told, row.tuned_for, row.competitor]
+            line: list[object] = [suite, places[id], id, row.told, row.tuned_for, row.competitor]
             line += [row.objective, row.failures]
             for name in scores:
                 summary = row.metrics.get(name)
