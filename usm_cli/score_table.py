@@ -6,14 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 from usm_baselines.benchmark.leaderboard import Standing, ranks
 from usm_baselines.benchmark.leaderboard_page import MARK, rank_labels
 from usm_baselines.benchmark.results import (
+    CompetitorScores,
     Scores,
     attitude_in,
     axes_in,
@@ -128,13 +127,8 @@ def combined_error(row: Scores) -> str:
     return give_or_take(1e3 * mean, 1e3 * margin)
 
 
-def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np.float64]]) -> str:
-    """Who wins, by how much, and how sure that is, in a sentence.
-
-    Args:
-        rows: The rows, best first.
-        objectives: The objective by policy and episode, mm, (episodes,).
-    """
+def conclusion(rows: Mapping[str, CompetitorScores]) -> str:
+    """Who wins, by how much, and how sure that is, in a sentence; rows: best first."""
     competing = [name for name, row in rows.items() if row.competitor]
     if not competing:
         return "None of these policies competes."
@@ -158,8 +152,9 @@ def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np
     if not beaten:
         return f"{first} is ahead over {episodes} scenarios, but {open_}."
     second = beaten[0]
-    ratio = objectives[second].mean() / objectives[first].mean()
-    low, high = ratio_interval(objectives[second], objectives[first])
+    behind, ahead = rows[second].objectives, best.objectives
+    ratio = behind.mean() / ahead.mean()
+    low, high = ratio_interval(behind, ahead)
     lead = (
         f"is {figures(ratio)} times as large (95 % interval {figures(low)} to {figures(high)}), "
         f"over {episodes} scenarios."

@@ -48,8 +48,7 @@ def printed(made, width, **options):
 
 def concluded(scores):
     """Return the sentence below a table."""
-    objectives = {policy.name: each.objective() for policy, each in scores}
-    return conclusion(ranked(scores), objectives)
+    return conclusion(ranked(scores))
 
 
 @pytest.mark.parametrize("lost", [0, 3])

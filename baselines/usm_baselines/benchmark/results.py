@@ -114,12 +114,6 @@ class Scores(Part):
         return float(objective({name: summary.mean for name, summary in self.metrics.items()}))
 
     @property
-    def objectives(self) -> Array:
-        """The objective of each episode, mm, (episodes,)."""
-        kept = {name: np.asarray(values) for name, values in self.per_episode.items()}
-        return np.asarray(objective(kept), np.float64)
-
-    @property
     def combined(self) -> tuple[float, float]:
         """The largest errors of all axes added up, m: mean, half the width of its interval."""
         episodes = np.sum([self.per_episode[MAX_ERROR + axis] for axis in self.axes], axis=0)
@@ -169,6 +163,12 @@ class CompetitorScores(Scores):
     told: str = ""
     note: str = ""
     tuned_for: str | None = None
+
+    @property
+    def objectives(self) -> Array:
+        """The objective of each episode, mm, (episodes,)."""
+        kept = {name: np.asarray(values) for name, values in self.per_episode.items()}
+        return np.asarray(objective(kept), np.float64)
 
     @staticmethod
     def about(contender: Contender) -> dict[str, Any]:
