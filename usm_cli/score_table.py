@@ -6,14 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
-from usm_baselines.benchmark.leaderboard import Standing
+from usm_baselines.benchmark.leaderboard import Standing, ranks
 from usm_baselines.benchmark.leaderboard_page import MARK, rank_labels
 from usm_baselines.benchmark.results import (
+    CompetitorScores,
     Scores,
     attitude_in,
     axes_in,
@@ -34,7 +33,8 @@ LEGEND = """\
 error: largest position error after settling, {axes} added up, mean ± half of its 95 % interval; \
 N/s: how much the thrust varies; lost: robots, each of which counts {loss} mm or more. \
 Order: the objective, which is the error plus {attitude} mm per degree of heading error and \
-{variation} mm per N/s. Rows that the data do not tell apart share a rank (=)."""
+{variation} mm per N/s. Rows share a rank (=) until the data tell one from the first \
+of them."""
 UNRANKED = "Rows without a rank are no competitors: they are told more than a vehicle knows."
 # What a lost robot counts at least, mm.
 LOSS = round(1e3 * LOST_ERROR)
@@ -65,11 +65,9 @@ class Column:
 
 def table(rows: Mapping[str, Standing], console: Console) -> Table:
     """The scores, best first, in as many columns as the console has room for."""
-    best = [row.rank for row in rows.values()].count(1)
-    styles = [
-        "dim" if row.rank is None else "bold" if row.rank == 1 and best < len(rows) else ""
-        for row in rows.values()
-    ]
+    places = list(ranks(rows).values())
+    alone = places.count(1) < len(rows)
+    styles = ["dim" if rank is None else "bold" if rank == 1 and alone else "" for rank in places]
     return _fitted(columns_of(rows), console, styles)
 
 
@@ -129,13 +127,8 @@ def combined_error(row: Scores) -> str:
     return give_or_take(1e3 * mean, 1e3 * margin)
 
 
-def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np.float64]]) -> str:
-    """Who wins, by how much, and how sure that is, in a sentence.
-
-    Args:
-        rows: The rows, best first.
-        objectives: The objective by policy and episode, mm, (episodes,).
-    """
+def conclusion(rows: Mapping[str, CompetitorScores]) -> str:
+    """Who wins, by how much, and how sure that is, in a sentence; rows: best first."""
     competing = [name for name, row in rows.items() if row.competitor]
     if not competing:
         return "None of these policies competes."
@@ -152,14 +145,16 @@ def conclusion(rows: Mapping[str, Standing], objectives: Mapping[str, NDArray[np
             f"{counted(episodes, 'scenario')} cannot say who wins; it takes {FEWEST_EPISODES}."
         )
     # By the rule of ranks, the data tell a row from the first unless it shares its rank.
-    tied = [name for name in others if rows[name].rank == best.rank]
+    places = ranks(rows)
+    tied = [name for name in others if places[name] == places[first]]
     beaten = [name for name in others if name not in tied]
     open_ = f"the data do not tell it from {_some(tied)}" if tied else ""
     if not beaten:
         return f"{first} is ahead over {episodes} scenarios, but {open_}."
     second = beaten[0]
-    ratio = objectives[second].mean() / objectives[first].mean()
-    low, high = ratio_interval(objectives[second], objectives[first])
+    behind, ahead = rows[second].objectives, best.objectives
+    ratio = behind.mean() / ahead.mean()
+    low, high = ratio_interval(behind, ahead)
     lead = (
         f"is {figures(ratio)} times as large (95 % interval {figures(low)} to {figures(high)}), "
         f"over {episodes} scenarios."

@@ -29,6 +29,8 @@ RESAMPLES = 10_000
 PARTS = 20
 # Single episodes are chaotic: from fewer no conclusion is drawn.
 FEWEST_EPISODES = 50
+# Quantiles between which a 95 % interval lies.
+LIMITS = (0.025, 0.975)
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -181,16 +183,23 @@ def compare(first: ArrayLike, second: ArrayLike) -> Comparison:
     )
 
 
-def told_apart(first: ArrayLike, second: ArrayLike) -> bool:
-    """Whether the data decide between two policies, as `compare` says, without the rest.
+def told_apart(scores: ArrayLike) -> NDArray[np.bool_]:
+    """Between which policies the data decide, as `compare` says of two, (policies, policies).
 
     Args:
-        first: Scores of the first policy, one per episode, (episodes,).
-        second: The same of the second policy, in the same order.
+        scores: Scores of each policy on the same episodes, (policies, episodes).
     """
-    differences = np.asarray(second, np.float64) - np.asarray(first, np.float64)
-    enough = differences.size >= FEWEST_EPISODES
-    return enough and _decided(differences.size, interval(np.mean, differences))
+    table = np.asarray(scores, np.float64)
+    count, episodes = table.shape
+    apart = np.zeros((count, count), bool)
+    if episodes < FEWEST_EPISODES:
+        return apart
+    draws = _draws(np.random.default_rng(0), episodes)
+    means = np.concatenate([table[:, part].mean(axis=-1) for part in draws], axis=-1)
+    for index in range(count - 1):
+        low, high = np.quantile(means[index + 1 :] - means[index], LIMITS, axis=-1)
+        apart[index, index + 1 :] = (low > 0.0) | (high < 0.0)
+    return apart | apart.T
 
 
 def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array, Array]:
@@ -215,7 +224,7 @@ def performance_profile(values: ArrayLike, thresholds: ArrayLike) -> tuple[Array
             for episodes, seeds in zip(*(np.array_split(o, PARTS) for o in counts), strict=True)
         ]
     )
-    limits = np.quantile(drawn / table.size, (0.025, 0.975), axis=0)
+    limits = np.quantile(drawn / table.size, LIMITS, axis=0)
     return below.mean(axis=(0, 1)), limits
 
 
@@ -238,7 +247,7 @@ def _interval(statistic: Callable[..., Any], *sizes: int) -> Interval:
         for _ in _draws(rng, size):  # all of a kind are drawn before the next kind
             pass
     values = np.concatenate([statistic(*part) for part in zip(*kinds, strict=True)])
-    low, high = np.quantile(values, (0.025, 0.975))
+    low, high = np.quantile(values, LIMITS)
     return float(low), float(high)
 
 

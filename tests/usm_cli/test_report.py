@@ -4,11 +4,12 @@ import base64
 import dataclasses
 import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.axe import violations
+from support.browser import find, show
 from usm_baselines.paper.reproduction import PAPER, ReproductionResult, declaration
 
 import usm_gym
@@ -20,7 +21,6 @@ from usm_gym.support.provenance import provenance
 from usm_gym.support.results import Provenance
 
 ROOT = Path(__file__).parents[2]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SHORT = dataclasses.replace(usm_gym.suite("operation")[1], duration=2.0, settle_time=0.5)
 SHORT = dataclasses.replace(
     SHORT, inspection=dataclasses.replace(SHORT.inspection, times=(0.8,), deflections=(0.9,))
@@ -87,50 +87,6 @@ def varied(folder):
     path = folder / "varied.html"
     main(["report", str(folder / "robustness" / "noise.json"), "--output", str(path)])
     return path
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    """A headless browser, whose console is read after each page."""
-    binary = next(filter(None, map(shutil.which, BROWSERS)), None)
-    driver = shutil.which("chromedriver")
-    if binary is None or driver is None:
-        pytest.skip("no Chromium with chromedriver is installed")
-    from selenium import webdriver
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for name in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--no-first-run",
-        f"--user-data-dir={tmp_path_factory.mktemp('browser')}",
-    ):
-        options.add_argument(name)
-    opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield opened
-    opened.quit()
-
-
-def show(browser, path, width=1280, scheme="light"):
-    """Open a page in a window of a width, and find no fault with it."""
-    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
-    browser.get(path.as_uri())
-    assert browser.get_log("browser") == []
-    assert browser.execute_script("return performance.getEntriesByType('resource').length") == 0
-
-
-def find(browser, selector):
-    return browser.find_element("css selector", selector)
 
 
 def drawn(browser, selector):
@@ -264,7 +220,7 @@ def test_the_whole_leaderboard_is_a_page(tmp_path):
     text = (tmp_path / "page.html").read_text()
     for suite, rows in json.loads(file.read_text())["suites"].items():
         assert f'data-choice="{suite}"' in text
-        assert all(f'data-value="{name}"' in text for name in rows)
+        assert all(f'data-name="{name}"' in text for name in rows)
     assert "Not as in the result" not in text
 
 
@@ -306,6 +262,7 @@ def test_a_page_is_readable(browser, folder, varied, width, scheme):
         assert browser.execute_script(BEYOND) == []
         assert browser.execute_script(FAINT) == []
         assert browser.execute_script(SMALLEST) >= 11
+        assert violations(browser) == []
 
 
 @pytest.mark.slow
@@ -335,7 +292,6 @@ def test_a_replay_obeys_slider_picker_and_button(browser, folder):
     np.testing.assert_allclose(shown, expected, rtol=1e-3)
     slider.send_keys("\ue011")
     find(browser, ".play").send_keys(" ")
-    browser.set_script_timeout(60)
     browser.execute_async_script(
         "const [end] = arguments;"
         "const wait = () => replays[0].playing ? requestAnimationFrame(wait) : end(); wait()"
@@ -380,15 +336,13 @@ def test_plots_zoom_and_tell_by_keys(browser, folder, varied):
 @pytest.mark.slow
 def test_tables_sort_both_ways_by_keys(browser, folder):
     show(browser, folder / "page.html")
-    for column, selector in ((0, "tbody th"), (2, "tbody td:nth-child(3)")):
-        head = f".scroll thead th:nth-child({column + 1})"
+    for column, selector in ((2, "tbody td:nth-child(3)"), (0, "tbody th")):
+        head = f".scroll:has(.beats) thead th:nth-child({column + 1})"
         found = []
         for order in ("ascending", "descending"):
             find(browser, f"{head} button").send_keys("\ue007")
             assert find(browser, head).get_attribute("aria-sort") == order
-            table = find(browser, ".scroll table")
-            cells = table.find_elements("css selector", selector)
-            values = [each.get_attribute("data-value") for each in cells]
-            found.append([float(each) for each in values] if column else values)
+            cells = find(browser, ".scroll:has(.beats)").find_elements("css selector", selector)
+            found.append([float(each.get_attribute("data-value")) for each in cells])
         assert found[0] == sorted(found[0]) == found[1][::-1]
         assert len(set(found[0])) == len(POLICIES)

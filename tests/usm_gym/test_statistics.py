@@ -31,8 +31,11 @@ def test_an_interval_covers_the_truth_about_as_often_as_it_says() -> None:
 @pytest.mark.parametrize("lead", [0.0, 0.2, 0.3, 1.0, -1.0])
 def test_two_are_told_apart_where_their_comparison_decides(episodes: int, lead: float) -> None:
     rng = np.random.default_rng(2)
-    first, second = rng.standard_normal((2, episodes))
-    assert told_apart(first, second + lead) == compare(first, second + lead).decided
+    table = rng.standard_normal((3, episodes))
+    table[1] += lead
+    found = told_apart(table)
+    for one, other in itertools.product(range(3), repeat=2):
+        assert found[one, other] == compare(table[one], table[other]).decided
 
 
 def test_intervals_have_no_randomness() -> None:

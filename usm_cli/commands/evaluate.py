@@ -127,5 +127,4 @@ def show(scores: Sequence[tuple[Contender, Evaluation]], where: str) -> None:
     if shifts_in(rows.values()):
         console.print(shift_table(rows, console))
     console.print(legend(rows), style="dim", markup=False)
-    objectives = {policy.name: evaluation.objective() for policy, evaluation in scores}
-    console.print(f"\n{conclusion(rows, objectives)}", style="bold", markup=False)
+    console.print(f"\n{conclusion(rows)}", style="bold", markup=False)

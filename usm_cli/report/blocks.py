@@ -16,12 +16,14 @@ class Mark:
         mean: Mean.
         high: Upper limit.
         worst: Worst episode.
+        beyond: "‹" or "›" where the mean is beyond that end of the scale; empty if it is not.
     """
 
     low: float
     mean: float
     high: float
     worst: float
+    beyond: str = ""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class Cell:
     Attributes:
         text: The text.
         value: The value by which rows are sorted.
-        detail: Smaller text behind it, such as an interval.
+        detail: Smaller text below it, such as an interval.
+        rank: The rank before the name of a policy; None in tables without ranks.
         marks: Intervals to draw instead of the text, by axis.
         alarm: Whether it is bad news.
     """
@@ -41,6 +44,7 @@ class Cell:
     detail: str = ""
     marks: Mapping[str, Mark] | None = None
     alarm: bool = False
+    rank: str | None = None
 
 
 @dataclass(frozen=True)
@@ -51,11 +55,31 @@ class Column:
         title: Its content, with the unit.
         ticks: Labels of the scale of the marks and their places, per cent of the width.
         marked: The axes of its marks, in order.
+        words: Whether it holds words and not numbers.
     """
 
     title: str
     ticks: Sequence[tuple[str, float]] = ()
     marked: Sequence[str] = ()
+    words: bool = False
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """What each row of a table is to every other: a last column shows it, for the rival chosen.
+
+    Attributes:
+        names: The rows in their order.
+        competing: How many of them compete; they come first.
+        verdicts: A letter for every rival, one text per row: whether the row beats it, "y", "n",
+            "u" where the data do not decide, "f" where there are too few episodes.
+        chances: In how many per cent of the episodes the row does better, (rows, rows).
+    """
+
+    names: Sequence[str]
+    competing: int
+    verdicts: Sequence[str]
+    chances: Sequence[Sequence[int]]
 
 
 @dataclass(frozen=True)
@@ -65,6 +89,7 @@ class SortableTable:
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
     notes: Sequence[str] = ()
+    rivals: Rivals | None = None
 
 
 @dataclass(frozen=True)
@@ -138,13 +163,15 @@ class Chapter:
     Attributes:
         title: Heading.
         lead: A description in a sentence.
-        motion: What joint motion does to the error, if known; for the head of the page.
-        verdict: Which controller copes; for the head of the page.
         blocks: The blocks, in order.
+        policies: The policies that it shows, which the page explains.
+        verdict: Which controller copes; for the head of the page.
+        motion: What joint motion does to the error, if known; for the head of the page.
     """
 
     title: str
     lead: str
-    motion: str
-    verdict: str
     blocks: Sequence[Tables | Plot | Replay | Facts]
+    policies: Sequence[str] = ()
+    verdict: str = ""
+    motion: str = ""

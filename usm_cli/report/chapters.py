@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from usm_agents.study.results import HomeResult, StudyResult
-from usm_baselines.benchmark.leaderboard import MAIN, LeaderboardResult, suites
-from usm_baselines.benchmark.results import EvaluationResult, Scores
+from usm_baselines.benchmark.leaderboard import CROSSED, MAIN, LeaderboardResult, suites
+from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, Scores
 from usm_baselines.benchmark.robustness import RobustnessResult
 from usm_baselines.contender import Contender, contender
 from usm_baselines.paper.reproduction import (
@@ -20,35 +20,39 @@ from usm_baselines.paper.reproduction import (
     run_case,
     side_by_side,
 )
-from usm_baselines.registry import entry, ids
+from usm_baselines.registry import ids
 
 from usm_cli.report import plots
 from usm_cli.report.blocks import Chapter, Facts, Plot, Replay, Tables
 from usm_cli.report.replay import PLANE, differing, recorded, replayed
 from usm_cli.report.tables import (
+    by_objective,
     competes,
     conditions_table,
     curve_table,
     paper_table,
     score_table,
+    verdict_table,
 )
 from usm_cli.report.words import PAPERS, in_words, motion, verdict
 from usm_gym.suites import unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.results import Provenance, Result
-from usm_gym.support.text import figures, listed
+from usm_gym.support.text import counted, figures, listed
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.metrics import MAX_ERROR
+from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
 from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import OtherScenario
 
 Progress = Callable[[int, int], object]
 
 SCORES = (
-    "Largest position error after settling: mean over the episodes with its 95 % interval, mean of "
-    "the middle half of the episodes, worst episode. Thrust is the mean force of a thruster, "
-    "variation how much it changes in a second: chattering. A lost robot counts 0.5 m or more."
+    "Largest position error after settling, mean over the episodes; rms is the root mean square, "
+    "variation how much the thrust changes in a second. The objective orders the rows: the error "
+    f"plus {ATTITUDE_WEIGHT} mm per degree of heading error and {VARIATION_WEIGHT} mm per N/s. "
+    "Rows share a rank (=) until the data tell one from the first of them. A lost robot counts "
+    "0.5 m or more."
 )
 CONDITIONS = (
     "What the simulation does to a controller. Every episode has another current and other "
@@ -105,17 +109,18 @@ def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> 
     rows = by_objective(result.results)
     return Chapter(
         title=f"Evaluation: {name}",
-        lead=f"{len(rows)} policies on {len(scenarios)} episodes.",
-        motion=motion(rows),
-        verdict=verdict(rows, len(scenarios)),
+        lead=f"{len(rows)} policies on {counted(len(scenarios), 'episode')}.",
         blocks=[
+            *(advice({name: rows}) if result.axes else []),
+            *front(rows, result.axes),
             replay(scenarios, rows, result.axes, choice, progress),
             Tables("Scores", SCORES, "suite", {name: score_table(rows, result.refused)}),
-            *front(rows, result.axes),
             *conditions("suite", name, scenarios),
-            names(),
             provenance(result.provenance),
         ],
+        policies=list(rows),
+        verdict=verdict(rows),
+        motion=motion(rows),
     )
 
 
@@ -129,20 +134,22 @@ def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -
         for name, rows in result.suites.items()
     }
     known = {name: scenarios[name] for name in result.suites if name in scenarios}
+    tiers = {tier: result.suites[name] for tier, name in CROSSED.items() if name in result.suites}
     return Chapter(
         title=f"Leaderboard of usm-gym {result.version}",
         lead=f"{len(rows)} policies on {len(tables)} suites; {MAIN}, with {episodes} episodes, "
         "is the main one.",
-        motion=motion(rows),
-        verdict=verdict(rows, episodes),
         blocks=[
+            *advice(tiers),
+            plots.front(tiers, result.front),
             replay(scenarios[MAIN], rows, result.axes, choice, progress),
             Tables("Scores", SCORES, "suite", tables),
-            plots.front(rows, result.front),
             Tables("Conditions", CONDITIONS, "suites", {"all": conditions_table(known)}),
-            names(),
             provenance(result.provenance),
         ],
+        policies=list(dict.fromkeys(id for rows in result.suites.values() for id in rows)),
+        verdict=verdict(rows),
+        motion=motion(rows),
     )
 
 
@@ -153,8 +160,6 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
         title=f"Robustness: {result.quantity}",
         lead=f"How the errors of {len(result.results)} policies grow with one quantity, with all "
         f"else equal, over {len(scenarios)} episodes at every value: {label}.",
-        motion="",
-        verdict="",
         blocks=[
             *([plots.robustness(result)] if result.axes else []),
             Tables(
@@ -171,9 +176,9 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
                 scenarios,
                 " These are the conditions before anything is varied.",
             ),
-            names(),
             provenance(result.provenance),
         ],
+        policies=list(result.results),
     )
 
 
@@ -203,8 +208,6 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
     return Chapter(
         title="Reproduction of Table 1",
         lead=f"The paper's laws as printed, at a step of {step:g} s, thrusters unlimited.",
-        motion="",
-        verdict="",
         blocks=[
             Tables(
                 "Table 1",
@@ -222,6 +225,7 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
             ),
             provenance(result.provenance),
         ],
+        policies=list(rows),
     )
 
 
@@ -235,8 +239,6 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     return Chapter(
         title="Study of learned agents",
         lead=f"Agents of {len(homes)} tiers with several seeds, and what their parts contribute.",
-        motion=motion(rows),
-        verdict=verdict(rows, len(episodes)),
         blocks=[
             replay(episodes, rows, first.axes, choice, progress),
             Tables(
@@ -246,9 +248,11 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
                 {title: score_table(scores, {}) for title, scores in tables},
             ),
             *(plot for name, home in homes for plot in drawn(name, home)),
-            names(),
             provenance(result.provenance),
         ],
+        policies=list(dict.fromkeys(policy for _, home in homes for policy in home.rows)),
+        verdict=verdict(rows),
+        motion=motion(rows),
     )
 
 
@@ -265,7 +269,8 @@ def sets(name: str, home: HomeResult) -> dict[str, dict[str, Scores]]:
 def drawn(name: str, home: HomeResult) -> list[Plot]:
     """The plots of a home."""
     found = [plots.learning(rows, home.axes) for rows in (home.agents, home.ablations) if rows]
-    found.append(plots.front({n: row.home for n, row in home.competitors.items()}, {}))
+    rows = {policy: row.home for policy, row in home.competitors.items()}
+    found.append(plots.front({name: rows}, {}))
     return [replace(plot, title=f"{plot.title}: {name}") for plot in found]
 
 
@@ -278,9 +283,11 @@ CHAPTERS: dict[type[Result], Callable[[Any, Choice, Progress], Chapter]] = {
 }
 
 
-def by_objective(rows: Mapping[str, Scores]) -> dict[str, Scores]:
-    """Sort rows by the objective, the smallest first."""
-    return dict(sorted(rows.items(), key=lambda pair: pair[1].objective))
+def advice(tiers: Mapping[str, Mapping[str, CompetitorScores]]) -> list[Tables]:
+    """Which policy to take, by tier; nothing where there is no choice."""
+    tables = {name: verdict_table(rows) for name, rows in tiers.items() if len(rows) > 1}
+    lead = "What each is the best of. Rows share a rank (=) until the data tell one from the first."
+    return [Tables("Which controller to take", lead, "tier", tables)] if tables else []
 
 
 def conditions(
@@ -302,7 +309,7 @@ def planar_only(scenarios: Sequence[Scenario | OtherScenario]) -> list[Scenario]
 
 def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
     """Error against thrust variation, if there are scores."""
-    return [plots.front(rows, {})] if axes else []
+    return [plots.front({"": rows}, {})] if axes else []
 
 
 def replay(
@@ -378,13 +385,6 @@ def able(
     known = [name for name in rows if name in ids()]
     why = "only registered policies are replayed unasked; name others with --policies"
     return [contender(name) for name in known], {name: why for name in rows if name not in known}
-
-
-def names() -> Facts:
-    """The meanings of the policies' names."""
-    meanings = {id: entry(id).summary for id in ids() if not id.endswith("-tuned")}
-    meanings["…-tuned"] = "the same law with gains from usm tune, on sampled scenarios"
-    return Facts("What the names mean", meanings)
 
 
 def provenance(source: Provenance) -> Facts:

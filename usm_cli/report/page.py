@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 
 from usm_cli.report.blocks import Chapter
+from usm_cli.report.words import glossary
 from usm_gym.rendering.figure import robot_drawing
 from usm_gym.robot import Robot
 
@@ -42,6 +43,7 @@ def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
     )
     return environment.get_template("page.html").render(
         chapters=chapters,
+        glossary=glossary(id for chapter in chapters for id in chapter.policies),
         motion=next((chapter.motion for chapter in chapters if chapter.motion), ""),
         verdict=next((chapter.verdict for chapter in chapters if chapter.verdict), ""),
         made=made,

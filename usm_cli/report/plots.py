@@ -15,6 +15,8 @@ from usm_cli.report.blocks import Plot
 from usm_cli.report.tables import competes
 
 VARIATION = "thrust variation, N/s"
+# Errors over so many times the best one are not drawn.
+REACH = 100.0
 
 
 @dataclass(frozen=True)
@@ -30,48 +32,65 @@ class Band:
     errors: Mapping[str, tuple[float, float, float]]
 
 
-def front(rows: Mapping[str, Scores], weights: Mapping[str, Sequence[FrontPoint]]) -> Plot:
+def front(
+    tiers: Mapping[str, Mapping[str, Scores]], weights: Mapping[str, Sequence[FrontPoint]]
+) -> Plot:
     """Plot error against thrust variation, and mark the policies that no other beats in both.
 
     Args:
-        rows: Rows of the policies.
-        weights: Points of policies tuned with other weights, by id.
+        tiers: Rows of the policies by the name of the panel.
+        weights: Points of policies tuned with other weights, by id, for the first panel.
     """
-    besides = f" A line joins other weights of {', '.join(weights)}." if weights else ""
-    variations = {name: row.metrics["thrust_variation"].mean for name, row in rows.items()}
-    shown = {name: row for name, row in rows.items() if competes(row) and variations[name] > 0}
-    panels = []
-    for axis in axes_in(rows.values()):
+    besides = f" The thin line joins other weights of {', '.join(weights)}." if weights else ""
+    panels, missing = [], 0
+    for name, rows in tiers.items():
         points: list[dict[str, Any]] = [
-            {"name": name, "x": variations[name], "y": row.errors[axis].mean * 1e3}
-            for name, row in shown.items()
+            {"name": id, "x": variation, "y": 1e3 * row.combined[0]}
+            for id, row in rows.items()
+            if competes(row)
+            and not row.failures
+            and (variation := row.metrics["thrust_variation"].mean) > 0
         ]
+        seen = within_reach(points)
+        missing += len(points) - len(seen)
         lines = [
             {
-                "name": f"{name}, other weights",
+                "name": f"{id}, other weights",
                 "x": [point.thrust_variation for point in line],
-                "y": [1e3 * point.errors[axis] for point in line],
+                "y": [1e3 * sum(point.errors.values()) for point in line],
             }
-            for name, line in weights.items()
+            for id, line in (weights if not panels else {}).items()
         ]
+        error = f"error {' + '.join(axes_in(rows.values()))}, mm"
         panels.append(
             {
-                "label": f"error in {axis}, mm",
-                "points": [point | {"front": not beaten(point, points)} for point in points],
+                "label": f"{name}: {error}" if len(tiers) > 1 else error,
+                "points": [point | {"front": not beaten(point, points)} for point in seen],
                 "lines": lines,
             }
         )
+    far = (
+        f" {missing} with errors over {REACH:g} times the best one are not drawn."
+        if missing
+        else ""
+    )
     return Plot(
-        "Error against thrust variation",
-        "Chattering thrusters easily buy a small error. Filled points are policies that no other "
-        f"beats in both; left and below is better.{besides}",
+        "What precision costs",
+        "Largest error after settling against how much the thrust changes in a second; left and "
+        f"below is better. Filled points are policies that no other beats in both.{besides}{far}",
         {
             "kind": "points",
             "x": {"label": VARIATION, "log": True},
             "y": {"log": True},
-            "panels": panels,
+            "panels": [panel for panel in panels if panel["points"]],
         },
     )
+
+
+def within_reach(points: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The points that can be read on one scale with the best."""
+    best = min((point["y"] for point in points), default=0.0)
+    return [point for point in points if point["y"] <= REACH * best]
 
 
 def beaten(point: Mapping[str, Any], points: Sequence[Mapping[str, Any]]) -> bool:

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
-from usm_baselines.benchmark.leaderboard import Lead, Standing
-from usm_baselines.benchmark.leaderboard_page import in_short
+import numpy as np
+from usm_baselines.benchmark.leaderboard_page import rank_labels
 from usm_baselines.benchmark.results import (
     CompetitorScores,
     Scores,
     Summary,
     attitude_in,
     axes_in,
+    lost,
+    medians_in,
     rms_in,
 )
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult
+from usm_baselines.benchmark.verdict import choices
 from usm_baselines.paper.reproduction import PARTS, ReproductionResult
 
-from usm_cli.report.blocks import Cell, Column, Mark, SortableTable
-from usm_gym.statistics import interquartile_mean
-from usm_gym.support.text import degrees, figures, listed, mm
-from usm_gym.task.metrics import MAX_ERROR
+from usm_cli.report.blocks import Cell, Column, Mark, Rivals, SortableTable
+from usm_cli.score_table import combined_error
+from usm_gym.statistics import FEWEST_EPISODES, told_apart
+from usm_gym.support.text import degrees, figures, mm
 from usm_gym.task.scenario import Scenario
 
+Row = TypeVar("Row", bound=Scores)
 CONDITIONS = (
     "suite",
     "episodes",
@@ -36,11 +41,19 @@ CONDITIONS = (
     "coefficients, true over nominal",
     "joint motion",
 )
+# The scale of the errors of a table covers so many decades; a label closer to an end of it than
+# this, per cent, is left out.
+DECADES, EDGE = 2.0, 6.0
 
 
 def competes(row: Scores) -> bool:
     """Whether a policy knows no more than a vehicle does."""
     return row.competitor if isinstance(row, CompetitorScores) else True
+
+
+def by_objective(rows: Mapping[str, Row]) -> dict[str, Row]:
+    """Sort rows: competitors first, the smaller objective first."""
+    return dict(sorted(rows.items(), key=lambda pair: (not competes(pair[1]), pair[1].objective)))
 
 
 def remark(row: Scores) -> str:
@@ -49,54 +62,80 @@ def remark(row: Scores) -> str:
     return note if competes(row) else "no competitor"
 
 
-def lead_of(row: Scores) -> Lead | None:
-    """A row's lead over the next row, if it has one."""
-    return row.beats_next if isinstance(row, Standing) else None
-
-
 def score_table(rows: Mapping[str, Scores], refused: Mapping[str, str]) -> SortableTable:
-    """Scores of policies on the same scenarios, one row per policy."""
-    scale = LogScale(error for row in rows.values() for error in row.errors.values())
-    decided = any(lead_of(row) for row in rows.values())
+    """Scores of policies on the same scenarios, one row per policy, best first."""
+    scale = LogScale(rows.values())
     axes = axes_in(rows.values())
+    ranked = {id: row for id, row in rows.items() if isinstance(row, CompetitorScores)}
+    places, each = rank_labels(ranked), ", ".join(axes)
+    medians = medians_in(rows.values())
     columns = [
-        Column("policy"),
-        Column("told"),
+        Column("rank, policy"),
         Column("objective, mm"),
-        *(Column(f"error {axis}, mm") for axis in axes),
-        Column(f"{listed(axes)} on one scale, mm" if axes else "error", scale.ticks, axes),
-        *(Column(f"middle half {axis}") for axis in axes),
-        *(Column(f"worst {axis}") for axis in axes),
-        *(Column(f"rms {axis}") for axis in rms_in(rows.values())),
+        Column(f"error {' + '.join(axes)}, mm"),
+        Column(f"{each} on one scale, mm" if axes else "error", scale.ticks, axes),
+        Column(f"{each}, mm"),
+        *([Column(f"median {each}")] if medians else []),
+        Column(f"worst {each}"),
+        *([Column(f"rms {each}")] if rms_in(rows.values()) else []),
         *(Column(f"{angle}, °") for angle in attitude_in(rows.values())),
-        Column("thrust, N"),
         Column("variation, N/s"),
         Column("lost"),
-        *([Column("beats the next")] if decided else []),
+        *([Column("told", words=True)] if ranked else []),
     ]
     body = []
-    for name, row in rows.items():
+    for place, (name, row) in enumerate(rows.items()):
         errors = row.errors
-        halves = [interquartile_mean(row.per_episode[MAX_ERROR + axis]) for axis in axes]
-        told = row.told if isinstance(row, CompetitorScores) else ""
-        cells = [Cell(name, name, remark(row)), Cell(told, told)]
-        cells.append(Cell(figures(row.objective), row.objective))
-        cells += [Cell(mm(e.mean), e.mean, interval(e)) for e in errors.values()]
+        cells = [Cell(name, place, remark(row), rank=places.get(name))]
+        cells += [Cell(figures(row.objective), row.objective), combined(row)]
         cells.append(Cell("", row.objective, marks=scale.marks(errors)))
-        cells += [length(float(half)) for half in halves]
-        cells += [length(error.worst) for error in errors.values()]
-        cells += [length(error.mean) for error in row.rms.values()]
+        cells.append(joint([error.mean for error in errors.values()]))
+        cells += [joint(list(row.medians.values()))] if medians else []
+        cells.append(joint([error.worst for error in errors.values()]))
+        cells += [joint([error.mean for error in row.rms.values()])] if row.rms else []
         cells += [Cell(degrees(e.mean), e.mean) for e in row.attitude.values()]
-        for key in ("thrust_effort", "thrust_variation"):
-            mean = row.metrics[key].mean
-            cells.append(Cell(figures(mean), mean))
-        cells.append(Cell(str(row.failures), row.failures, alarm=row.failures > 0))
-        if decided:
-            cells.append(decision(lead_of(row)))
+        variation = row.metrics["thrust_variation"].mean
+        cells.append(Cell(figures(variation), variation))
+        share = lost(row, bool(medians)).replace(" (", "\n(")
+        cells.append(Cell(share, row.failures, alarm=row.failures > 0))
+        cells += [Cell(ranked[name].told, ranked[name].told)] if name in ranked else []
         body.append(cells)
-    return SortableTable(
-        columns, body, [f"{name} is refused: {why}" for name, why in refused.items()]
-    )
+    notes = [f"{name} is refused: {why}" for name, why in refused.items()]
+    return SortableTable(columns, body, notes, rivals(ranked) if len(ranked) > 1 else None)
+
+
+def verdict_table(rows: Mapping[str, CompetitorScores]) -> SortableTable:
+    """The policies to choose from, and what each is the best of."""
+    places = rank_labels(rows)
+    body = [
+        [
+            Cell(name, place, rank=places[name]),
+            Cell(", ".join(reasons), reasons[0]),
+            Cell(combined_error(rows[name]), rows[name].combined[0]),
+            Cell(figures(variation := rows[name].metrics["thrust_variation"].mean), variation),
+        ]
+        for place, (name, reasons) in enumerate(choices(rows).items())
+    ]
+    error = f"error {' + '.join(axes_in(rows.values()))}, mm"
+    columns = [Column("rank, policy"), Column("why", words=True), Column(error)]
+    return SortableTable([*columns, Column("variation, N/s")], body)
+
+
+def rivals(rows: Mapping[str, CompetitorScores]) -> Rivals:
+    """What policies are to one another; rows: competitors first, best first."""
+    objectives = np.array([row.objectives for row in rows.values()])
+    apart, means = told_apart(objectives), objectives.mean(axis=-1)
+    better = 0.5 - 0.5 * np.sign(objectives[:, None] - objectives[None])
+    few = objectives.shape[1] < FEWEST_EPISODES
+    verdicts = [
+        "".join(
+            "f" if few else "u" if not told else "y" if mean < rival else "n"
+            for rival, told in zip(means, decided, strict=True)
+        )
+        for mean, decided in zip(means, apart, strict=True)
+    ]
+    chances = np.rint(100 * better.mean(axis=-1)).astype(int).tolist()
+    return Rivals(list(rows), sum(map(competes, rows.values())), verdicts, chances)
 
 
 def curve_table(result: RobustnessResult) -> SortableTable:
@@ -164,48 +203,52 @@ def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
 
 
 class LogScale:
-    """A logarithmic scale for all errors of a table.
+    """A logarithmic scale for the errors of a table, from the best competitor's on.
 
     Attributes:
-        ticks: Decades in mm and their places, per cent.
+        ticks: Labels in mm and their places, per cent.
     """
 
-    def __init__(self, errors: Iterable[Summary]) -> None:
-        """Span means, intervals and worst episodes, m."""
-        numbers = [number for error in errors for number in _numbers(error)]
-        positive = [number for number in numbers if number > 0] or [1e-3]
-        self._low = math.log10(min(positive)) - 0.1
-        self._width = math.log10(max(positive)) + 0.1 - self._low
-        decades = range(math.ceil(self._low), math.floor(self._low + self._width) + 1)
-        self.ticks = [(f"{10.0 ** (power + 3):g}", self._place(10.0**power)) for power in decades]
+    def __init__(self, rows: Iterable[Scores]) -> None:
+        """Begin below the smallest error of a competitor that loses no robot."""
+        every = list(rows)
+        able = [row for row in every if competes(row) and not row.failures] or every
+        lows = [error.ci95[0] for row in able for error in row.errors.values()]
+        self._low = math.log10(0.8 * min([low for low in lows if low > 0] or [1e-3]))
+        powers = range(math.floor(self._low), math.ceil(self._low + DECADES) + 1)
+        marks = [digit * 10.0**power for power in powers for digit in (1, 3)]
+        places = [(f"{1e3 * mark:g}", self._place(mark)) for mark in marks]
+        self.ticks = [tick for tick in places if EDGE < tick[1] < 100 - EDGE]
 
     def marks(self, errors: Mapping[str, Summary]) -> dict[str, Mark]:
         """The places of errors, by axis."""
-        return {axis: Mark(*map(self._place, _numbers(error))) for axis, error in errors.items()}
+        return {axis: self._mark(error) for axis, error in errors.items()}
+
+    def _mark(self, error: Summary) -> Mark:
+        low, high = error.ci95
+        mean = self._place(error.mean)
+        beyond = "‹" if mean < 0 else "›" if mean > 100 else ""
+        seen = (
+            min(max(self._place(at), 0.0), 100.0) for at in (low, error.mean, high, error.worst)
+        )
+        return Mark(*seen, beyond)
 
     def _place(self, metres: float) -> float:
-        power = math.log10(metres) if metres > 0 else self._low
-        return round(100 * (power - self._low) / self._width, 2)
+        power = math.log10(metres) if metres > 0 else -math.inf
+        return round(100 * (power - self._low) / DECADES, 2)
+
+
+def combined(row: Scores) -> Cell:
+    """The largest errors of all axes added up, mm, and below it half of its interval."""
+    return Cell(combined_error(row).replace(" ±", "\n±"), row.combined[0])
+
+
+def joint(lengths: Sequence[float]) -> Cell:
+    """Lengths, m, one below the other in mm."""
+    return Cell("\n".join(map(mm, lengths)), sum(lengths))
 
 
 def interval(error: Summary) -> str:
     """The 95 % interval of a length, mm."""
     low, high = error.ci95
     return f"[{mm(low)}, {mm(high)}]"
-
-
-def length(metres: float) -> Cell:
-    """A length in mm."""
-    return Cell(mm(metres), metres)
-
-
-def decision(lead: Lead | None) -> Cell:
-    """Whether a row is better than the next, and with what probability per episode."""
-    if lead is None:
-        return Cell("", -1.0)
-    return Cell(in_short(lead), lead.probability, f"{lead.probability:.2f}")
-
-
-def _numbers(error: Summary) -> tuple[float, float, float, float]:
-    low, high = error.ci95
-    return low, error.mean, high, error.worst

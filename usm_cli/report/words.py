@@ -1,66 +1,65 @@
-"""Describes scores and scenarios in sentences."""
+"""Describes scores, scenarios and policies in sentences."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
+from statistics import median
 
-from usm_baselines.benchmark.results import Scores
+from usm_baselines.benchmark.results import CompetitorScores, Scores
+from usm_baselines.registry import base_of, entry, ids
 
 from usm_cli.report.tables import competes
-from usm_gym.statistics import FEWEST_EPISODES
-from usm_gym.support.text import listed, mm
-from usm_gym.task.metrics import RECOVERY
+from usm_cli.score_table import combined_error, conclusion
+from usm_gym.support.text import counted, figures, listed
 from usm_gym.task.scenario import Scenario
 
 # The paper's controller, with which the best one is compared.
 PAPERS = "sta"
-
-
-def in_axes(row: Scores, metric: str) -> str:
-    """Write the mean of a metric in each axis."""
-    errors = row.by_axis(metric).items()
-    return listed([f"{mm(error.mean)} mm in {axis}" for axis, error in errors])
-
-
-def competitors(rows: Mapping[str, Scores]) -> dict[str, Scores]:
-    """The rows of policies that know no more than a vehicle does and lost no robot."""
-    return {name: row for name, row in rows.items() if competes(row) and row.failures == 0}
+# Ends of the names of policies that are forms of others, as the glossary explains them.
+FORMS = {
+    "lag": "the same law, told the lag of the thrusters",
+    "navigator": "the same law on the navigator's estimates",
+    "tuned": "the same law with gains from usm tune, for field",
+    "basin": "the same law with gains for basin",
+    "sea": "the same law with gains for sea",
+}
 
 
 def motion(rows: Mapping[str, Scores]) -> str:
-    """Describe what joint motion does to the controller that it harms most."""
-
-    def total(row: Scores, metric: str) -> float:
-        return sum(error.mean for error in row.by_axis(metric).values())
-
-    def harm(row: Scores) -> float:
-        return total(row, "max_error") / total(row, "settled_error")
-
-    known = {
-        name: row for name, row in competitors(rows).items() if total(row, "settled_error") > 0
-    }
+    """Say that most of the error comes from the joints, if it does."""
+    known = [row for row in rows.values() if competes(row) and row.failures == 0]
     if not known:
         return ""
-    name, row = max(known.items(), key=lambda pair: harm(pair[1]))
+
+    def middle(metric: str) -> float:
+        return 1e3 * median(sum(e.mean for e in row.by_axis(metric).values()) for row in known)
+
+    then, otherwise = middle("max_error"), middle("settled_error")
+    if otherwise > then / 2:
+        return ""
+    axes = " + ".join(known[0].axes)
     return (
-        f"With {name} the error reaches {in_axes(row, 'max_error')}, but only "
-        f"{in_axes(row, 'settled_error')} outside the {RECOVERY:g} s after each motion of the "
-        "joints."
+        f"Most of the error comes right after a bend: {figures(then)} mm then, "
+        f"{figures(otherwise)} mm otherwise ({axes}, median of "
+        f"{counted(len(known), 'controller')})."
     )
 
 
-def verdict(rows: Mapping[str, Scores], episodes: int) -> str:
-    """Compare the best controller with the paper's."""
-    known = competitors(rows)
+def verdict(rows: Mapping[str, Scores]) -> str:
+    """Say who wins, and where the paper's law is; rows: best first."""
+    known = {name: row for name, row in rows.items() if competes(row)}
     if not known:
         return ""
-    best = min(known, key=lambda name: known[name].objective)
+    ranked = {name: row for name, row in known.items() if isinstance(row, CompetitorScores)}
+    best = next(iter(known))
     said = (
-        f"The best, {best}, keeps it to {in_axes(known[best], 'max_error')}, the mean of "
-        f"{episodes} episodes{'' if episodes >= FEWEST_EPISODES else ', too few for a conclusion'}."
+        conclusion(ranked)
+        if ranked
+        else f"{best} is ahead with an error of {combined_error(known[best])} mm."
     )
     if PAPERS in rows and best != PAPERS:
-        said += f" The paper's {PAPERS} comes to {in_axes(rows[PAPERS], 'max_error')}."
+        said += f" The paper's {PAPERS} comes to {combined_error(rows[PAPERS])} mm."
     return said
 
 
@@ -70,9 +69,9 @@ def in_words(scenario: Scenario) -> str:
     parts = [f"{scenario.mode} mode, {scenario.duration:g} s, at {100 * path.speed:.1f} cm/s"]
     if scenario.shifts:
         bends = zip(scenario.inspection.deflections, scenario.shifts, strict=True)
-        listed = ", ".join(f"{angle:+.2f} rad at {time:.1f} s" for angle, time in bends)
-        listed = listed.replace("-", "−")
-        parts.append(f"the last {scenario.inspection.bending_joints} joints bend by {listed}")
+        turned = listed([f"{math.degrees(angle):+.0f}° at {time:.1f} s" for angle, time in bends])
+        turned = turned.replace("-", "−")
+        parts.append(f"the last {scenario.inspection.bending_joints} joints bend by {turned}")
     current = sum(speed**2 for speed in water.current) ** 0.5
     parts.append(f"current {100 * current:.1f} cm/s")
     low, high = min(water.coefficients), max(water.coefficients)
@@ -80,3 +79,12 @@ def in_words(scenario: Scenario) -> str:
     parts.append(f"position noise {1e3 * conditions.position_noise:g} mm")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
+
+
+def glossary(policies: Iterable[str]) -> dict[str, str]:
+    """The meanings of the names of registered policies, a law once, and of the ends of names."""
+    present = set(policies)
+    shown = [id for id in ids() if id in present]
+    meanings = {base_of(id): entry(base_of(id)).summary for id in shown}
+    ends = {part for id in shown for part in id.removeprefix(base_of(id)).split("-")}
+    return meanings | {f"…-{form}": text for form, text in FORMS.items() if form in ends}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -66,13 +67,10 @@ class Standing(CompetitorScores):
 
     Attributes:
         metrics: Summaries by metric, for the largest errors with the middle half.
-        rank: The place of the first row from which the data do not tell it, its own if they tell it
-            from all before; None if it is no competitor.
         beats_next: Its lead over the next row; None before a row that is no competitor, and last.
     """
 
     metrics: Mapping[str, MiddleSummary | Summary]
-    rank: Count | None = None
     beats_next: Lead | None = None
 
     def __post_init__(self) -> None:
@@ -261,37 +259,44 @@ def ranked(scores: Sequence[tuple[Contender, Evaluation]]) -> dict[str, Standing
         for (better, one), (worse, other) in pairwise(order)
         if not worse.privileged
     }
-    places = ranks([scores for contender, scores in order if not contender.privileged])
-    places += [None] * (len(order) - len(places))
     return {
-        contender.name: standing(outcome, contender, place, leads.get(contender.name))
-        for (contender, outcome), place in zip(order, places, strict=True)
+        contender.name: standing(outcome, contender, leads.get(contender.name))
+        for contender, outcome in order
     }
 
 
-def ranks(order: Sequence[Evaluation]) -> list[int | None]:
-    """The ranks of rows, best first: see `Standing.rank`."""
-    places: list[int | None] = []
-    objectives = [scores.objective() for scores in order]
-    for index, scores in enumerate(objectives):
-        tied = (
-            place
-            for place, better in enumerate(objectives[:index])
-            if not told_apart(better, scores)
-        )
-        places.append(next(tied, index) + 1)
-    return places
+def ranks(rows: Mapping[str, CompetitorScores]) -> dict[str, int | None]:
+    """The ranks of rows, best first, by policy; None of those that are no competitors.
+
+    Going down, a row shares the rank of the first row of the current group if the data do not tell
+    it from that row; otherwise it opens a new group with its own place: 1, 2, 2, 4.
+    """
+    found: dict[str, int | None] = dict.fromkeys(rows)
+    competing = [id for id, row in rows.items() if row.competitor]
+    if not competing:
+        return found
+    apart, first = told_apart([rows[id].objectives for id in competing]), 0
+    for place, id in enumerate(competing):
+        if apart[first, place]:
+            first = place
+        found[id] = first + 1
+    return found
 
 
 def best_of_laws(rows: Mapping[str, Standing]) -> dict[str, Standing]:
-    """Of rows, best first: every law with its best gains, and those of the paper.
+    """Of rows, best first: every law with its best gains, the calmer ones, and those of the paper.
 
-    A law that is told the lag is not another law here.
+    Calmer are gains if none that are better change the thrust less. A law that is told the lag is
+    not another law here.
     """
-    best: dict[str, str] = {}
-    for id in rows:
-        best.setdefault(law_of(id).removesuffix("-lag"), id)
-    return {id: row for id, row in rows.items() if id in best.values() or id in PAPER}
+    calmest: dict[str, float] = {}
+    kept: dict[str, Standing] = {}
+    for id, row in rows.items():
+        law, variation = law_of(id).removesuffix("-lag"), row.metrics["thrust_variation"].mean
+        if id in PAPER or variation < calmest.get(law, math.inf):
+            kept[id] = row
+        calmest[law] = min(variation, calmest.get(law, math.inf))
+    return kept
 
 
 def law_of(id: str) -> str:
@@ -320,9 +325,7 @@ def crossed(result: LeaderboardResult) -> dict[str, dict[str, str]]:
     }
 
 
-def standing(
-    scores: Evaluation, contender: Contender, rank: int | None, lead: Lead | None
-) -> Standing:
+def standing(scores: Evaluation, contender: Contender, lead: Lead | None) -> Standing:
     """A policy's row: the summary of its scores, interquartile means, and the main episodes."""
     summary = scores.summary()
     errors = [MAX_ERROR + axis for axis in axes_of(scores.per_episode)]
@@ -333,7 +336,7 @@ def standing(
     attitude = [angle + ANGLE_ERROR for angle in attitude_of(scores.per_episode)]
     kept = (*errors, *attitude, "thrust_variation", "failed")
     summary["per_episode"] = {name: summary["per_episode"][name] for name in kept}
-    return Standing.of(summary, **Standing.about(contender), rank=rank, beats_next=lead)
+    return Standing.of(summary, **Standing.about(contender), beats_next=lead)
 
 
 def point(scores: Evaluation) -> FrontPoint:

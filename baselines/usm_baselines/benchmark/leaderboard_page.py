@@ -14,8 +14,10 @@ from usm_baselines.benchmark.leaderboard import (
     LeaderboardResult,
     Standing,
     crossed,
+    ranks,
 )
 from usm_baselines.benchmark.results import (
+    CompetitorScores,
     Summary,
     attitude_in,
     axes_in,
@@ -37,18 +39,21 @@ MARK = "†"
 # Metrics without columns in the CSV file.
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
-Largest position error after settling, mm: mean over the episodes with its 95 % interval, mean of
-the middle half of the episodes, worst episode; root mean square, mm; largest heading error, °.
+Largest position error after settling, mm: mean over the episodes, with half of its 95 % interval;
+worst episode. Largest heading error, °. Variation is how much the thrust changes in a second.
 "Told" is what a policy knows besides the measured position and the reference. Rows are ordered by
 the objective by which gains and agents are chosen: the means in {axes} added up, plus {attitude} mm
-per degree of heading error and {variation} mm per N/s of thrust variation. The rank of a row is the
-place of the first row from which the data do not tell it. "Beats the next" says whether the
-interval of the paired difference to the next row leaves out 0, and with what probability an episode
-goes better. "Over informed" is a row's means over those of the law that is told what is constant in
-an episode: the distance that knowledge could close.
+per degree of heading error and {variation} mm per N/s of thrust variation. Going down, rows share a
+rank (=) until the data tell one from the first of them. "Beats the next" says whether the interval
+of the paired difference to the next row leaves out 0, and with what probability an episode goes
+better. "Over informed" is a row's means over those of the law that is told what is constant in an
+episode: the distance that knowledge could close.
+
+`leaderboard.csv` has every metric with its interval. `usm report` makes a page of the file
+`leaderboard.json`, whose tables sort and compare each row with a rival of your choice.
 """
 MEDIAN_LEGEND = """\
-Where robots are lost, and in scans, a table also has the median of the largest error, mm, and the
+Where robots are lost, and in scans, a table also has the median of the largest error and the
 share of lost robots; a lost one counts as half a metre or more in the mean.
 """
 SHIFT_LEGEND = "Largest error from a shift of the joint references to the next, mm, mean, {axes}.\n"
@@ -59,33 +64,27 @@ Gains tuned for one tier of conditions, scored in all: largest error after settl
 
 
 def table(rows: Mapping[str, Standing]) -> str:
-    """The rows of a suite as Markdown."""
-    axes, angles = axes_in(rows.values()), attitude_in(rows.values())
-    medians = medians_in(rows.values())
-    tuned = any(row.tuned_for for row in rows.values())
-    columns = ["told", *(["tuned for"] if tuned else []), *(f"{axis}, mm" for axis in axes)]
-    columns += [f"median {axis}" for axis in medians]
-    columns += [f"{what} {axis}" for what in ("middle half", "worst") for axis in axes]
-    columns += [f"rms {axis}" for axis in rms_in(rows.values())]
-    columns += [f"{angle}, °" for angle in angles]
-    ratios = over_informed(rows)
-    columns += ["over informed"] if ratios else []
-    lines = _head([*columns, "objective", "thrust, N", "variation, N/s", "lost", "beats the next"])
-    places = rank_labels(rows)
+    """The rows of a suite as Markdown, with no more than what a reader compares them by."""
+    axes, places, ratios = axes_in(rows.values()), rank_labels(rows), over_informed(rows)
+    medians, each = medians_in(rows.values()), " / ".join(axes)
+    columns = [f"error {' + '.join(axes)}, mm", *(f"{axis}, mm" for axis in axes), f"worst {each}"]
+    columns += [f"median {each}"] if medians else []
+    columns += [f"{angle}, °" for angle in attitude_in(rows.values())]
+    columns += ["variation, N/s", "lost"]
+    columns += [*(["over informed"] if ratios else []), "beats the next"]
+    lines = [f"| | policy | {' | '.join(columns)} | told |"]
+    lines.append(f"|---|---|{'---:|' * len(columns)}---|")
     for id, row in rows.items():
-        errors = row.errors.values()
-        cells = [row.told, *([row.tuned_for or ""] if tuned else []), *map(_mean, errors)]
-        cells += [mm(row.medians[axis]) for axis in medians]
-        cells += [mm(error.iqm) for error in row.middle] + [mm(error.worst) for error in errors]
-        cells += [mm(error.mean) for error in row.rms.values()]
+        mean, margin = row.combined
+        errors, lead = row.errors.values(), row.beats_next
+        cells = [give_or_take(1e3 * mean, 1e3 * margin), *(mm(error.mean) for error in errors)]
+        cells.append(" / ".join(mm(error.worst) for error in errors))
+        cells += [" / ".join(map(mm, row.medians.values()))] if medians else []
         cells += [degrees(error.mean) for error in row.attitude.values()]
+        cells += [figures(row.metrics["thrust_variation"].mean), lost(row, bool(medians))]
         cells += [ratios[id]] if ratios else []
-        cells.append(figures(row.objective))
-        cells += [figures(row.metrics[key].mean) for key in ("thrust_effort", "thrust_variation")]
-        lead = row.beats_next
-        decision = "" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})"
-        cells += [lost(row, bool(medians)), decision]
-        lines.append(_line(places[id], id, row, cells))
+        cells.append("" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})")
+        lines.append(_line(places[id], id, row, [*cells, row.told]))
     return "\n".join([*lines, *_notes(rows)]) + "\n"
 
 
@@ -151,14 +150,15 @@ def cross_table(result: LeaderboardResult) -> str:
     return "\n".join(lines) + "\n"
 
 
-def rank_labels(rows: Mapping[str, Standing]) -> dict[str, str]:
+def rank_labels(rows: Mapping[str, CompetitorScores]) -> dict[str, str]:
     """The rows' ranks as text, with "=" where several share one."""
-    shared = Counter(row.rank for row in rows.values())
+    found = ranks(rows)
+    shared = Counter(found.values())
 
     def label(rank: int | None) -> str:
         return "" if rank is None else f"{rank}=" if shared[rank] > 1 else str(rank)
 
-    return {id: label(row.rank) for id, row in rows.items()}
+    return {id: label(rank) for id, rank in found.items()}
 
 
 def in_short(lead: Lead) -> str:
@@ -232,8 +232,9 @@ def csv_text(result: LeaderboardResult) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(head)
     for suite, rows in result.suites.items():
+        places = ranks(rows)
         for id, row in rows.items():
-            line: list[object] = [suite, row.rank, id, row.told, row.tuned_for, row.competitor]
+            line: list[object] = [suite, places[id], id, row.told, row.tuned_for, row.competitor]
             line += [row.objective, row.failures]
             for name in scores:
                 summary = row.metrics.get(name)

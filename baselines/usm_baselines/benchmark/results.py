@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY, asdict
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 
 from usm_baselines.contender import Contender
@@ -19,6 +20,7 @@ from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
 from usm_gym.task.stored_scenario import StoredScenarios
 
+Array = NDArray[np.float64]
 Failures = Annotated[int, Field(strict=True, ge=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 
@@ -161,6 +163,12 @@ class CompetitorScores(Scores):
     told: str = ""
     note: str = ""
     tuned_for: str | None = None
+
+    @property
+    def objectives(self) -> Array:
+        """The objective of each episode, mm, (episodes,)."""
+        kept = {name: np.asarray(values) for name, values in self.per_episode.items()}
+        return np.asarray(objective(kept), np.float64)
 
     @staticmethod
     def about(contender: Contender) -> dict[str, Any]:

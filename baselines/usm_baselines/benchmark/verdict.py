@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from usm_baselines.benchmark.leaderboard import Standing
 from usm_baselines.benchmark.results import INFORMED, CompetitorScores
 from usm_baselines.families import Family
 from usm_baselines.registry import base_of, entry, ids
@@ -31,7 +30,7 @@ REASONS: dict[str, Callable[[str, CompetitorScores], bool]] = {
 }
 
 
-def choices(rows: Mapping[str, Standing]) -> dict[str, list[str]]:
+def choices(rows: Mapping[str, CompetitorScores]) -> dict[str, list[str]]:
     """The policies between which a reader will choose, best first, with what each is the best of.
 
     Args:
