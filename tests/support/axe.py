@@ -1,0 +1,34 @@
+"""Accessibility of the page that a browser shows, by axe-core."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import Any
+
+RUN = """
+const done = arguments[arguments.length - 1];
+axe.run(document, {resultTypes: ["violations"]})
+  .then((found) => done(found.violations), (error) => done(String(error)));
+"""
+
+
+def violations(driver: Any) -> list[str]:
+    """What axe-core finds wrong on the page that is loaded, a line for every element.
+
+    Args:
+        driver: A Selenium driver.
+
+    Raises:
+        RuntimeError: axe-core could not run.
+    """
+    # The package has a recent axe-core; its own classes are for another driver.
+    script = resources.files("axe_playwright_python") / "axe.min.js"
+    driver.execute_script(script.read_text(encoding="utf-8"))
+    found = driver.execute_async_script(RUN)
+    if isinstance(found, str):
+        raise RuntimeError(found)
+    return [
+        " ".join(f"{rule['id']}: {node['html'][:120]}: {node['failureSummary']}".split())
+        for rule in found
+        for node in rule["nodes"]
+    ]
