@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import usm_baselines
 from markdown_it import MarkdownIt
+from support import axe
 from usm_agents.artifact.folder import PRETRAINED
 from usm_agents.learning import training
 from usm_agents.learning.plan import Plan
@@ -49,6 +50,7 @@ SHORTER_PYTHON = {
 LEFT_OUT = (
     "python3 -m venv",
     "python -m ",
+    "python docs/",
     "source ",
     "git ",
     ".venv/bin/",
@@ -151,22 +153,45 @@ def test_every_law_has_its_place_among_the_controllers():
     assert {re.sub("-(tuned|basin|sea)$", "", id) for id in laws} == shown
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path, monkeypatch):
-    short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
-    monkeypatch.setattr(usm_gym, "suite", lambda name: short)
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, whose figures have a short episode."""
     commands = pytest.importorskip("mkdocs.commands.build")
+    pages, made = tmp_path_factory.mktemp("pages"), tmp_path_factory.mktemp("site")
+    short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(usm_gym, "suite", lambda name: short)
+        runpy.run_path(str(ROOT / "docs" / "prepare"))["prepare"](pages)
     config = pytest.importorskip("mkdocs.config").load_config(
-        str(ROOT / "mkdocs.yml"), strict=True, site_dir=str(tmp_path)
+        str(ROOT / "mkdocs.yml"), strict=True, docs_dir=str(pages), site_dir=str(made)
     )
     config.plugins.run_event("startup", command="build", dirty=False)
     commands.build(config)
-    pages = list(tmp_path.rglob("*.html"))
-    model, laws = (
-        (tmp_path / name / "index.html").read_text(encoding="utf-8")
-        for name in ("model", "controllers")
+    return made
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(site):
+    front, model, laws = (
+        (site / name / "index.html").read_text(encoding="utf-8")
+        for name in ("", "model", "controllers")
     )
     assert "<mtable" in model
     assert laws.count("<svg") > 8
-    assert "<!-- law" not in laws
-    assert not [page for page in pages if "arithmatex" in page.read_text(encoding="utf-8")]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").partition("<details>")[0]
+    rows = re.findall(r"\| (`.+?`) \|.+\| ([\d.]+ ± [\d.]+) \|", readme)
+    assert len(rows) > 9
+    shown = re.findall(r"<td>(<code>.+?</code>)</td>.*?>([\d.]+ ± [\d.]+)</td>", front, re.DOTALL)
+    assert shown == [(f"<code>{id.strip('`')}</code>", error) for id, error in rows]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_of_the_site_bars_a_reader(site, browser, scheme):
+    media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+    found = {}
+    for page in sorted(site.rglob("*.html")):
+        browser.get(page.as_uri())
+        found[page.relative_to(site).as_posix()] = axe.violations(browser)
+    assert not {page: wrong for page, wrong in found.items() if wrong}

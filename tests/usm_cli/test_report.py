@@ -4,7 +4,6 @@ import base64
 import dataclasses
 import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,6 @@ from usm_gym.support.provenance import provenance
 from usm_gym.support.results import Provenance
 
 ROOT = Path(__file__).parents[2]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SHORT = dataclasses.replace(usm_gym.suite("operation")[1], duration=2.0, settle_time=0.5)
 SHORT = dataclasses.replace(
     SHORT, inspection=dataclasses.replace(SHORT.inspection, times=(0.8,), deflections=(0.9,))
@@ -87,35 +85,6 @@ def varied(folder):
     path = folder / "varied.html"
     main(["report", str(folder / "robustness" / "noise.json"), "--output", str(path)])
     return path
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    """A headless browser, whose console is read after each page."""
-    binary = next(filter(None, map(shutil.which, BROWSERS)), None)
-    driver = shutil.which("chromedriver")
-    if binary is None or driver is None:
-        pytest.skip("no Chromium with chromedriver is installed")
-    from selenium import webdriver
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for name in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--no-first-run",
-        f"--user-data-dir={tmp_path_factory.mktemp('browser')}",
-    ):
-        options.add_argument(name)
-    opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield opened
-    opened.quit()
 
 
 def show(browser, path, width=1280, scheme="light"):

@@ -190,13 +190,25 @@ def markdown(result: LeaderboardResult) -> str:
     return "\n".join(parts)
 
 
-def readme_block(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
-    """The verdict in every tier, and the whole table of the main suite, between their marks."""
+def verdict(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
+    """The verdict in every tier: the figure, and the policies to choose from.
+
+    Args:
+        result: The leaderboard.
+        figure: Where the figure is, from the page.
+        decisions: As of `verdict_table`.
+    """
     axes = " + ".join(result.axes)
-    parts = [MARKS[0], f"![Error {axes} against thrust variation, tier by tier]({figure})\n"]
+    parts = [f"![Error {axes} against thrust variation, tier by tier]({figure})\n"]
     for tier, name in CROSSED.items():
         if name in result.suites:
             parts += [f"**In `{tier}`**\n", verdict_table(result.suites[name], decisions)]
+    return "\n".join(parts)
+
+
+def readme_block(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
+    """The verdict, and the whole table of the main suite, between their marks."""
+    parts = [MARKS[0], verdict(result, figure, decisions)]
     parts.append(f"<details><summary>All {len(result.main)} policies in `field`</summary>\n")
     parts += [brief_table(result.main), "</details>", MARKS[1], ""]
     return "\n".join(parts)

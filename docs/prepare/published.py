@@ -1,0 +1,50 @@
+"""Puts the verdict and the measured speed in their places."""
+
+from functools import cache
+from pathlib import Path
+
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
+from usm_baselines.benchmark.leaderboard_page import verdict
+
+import usm_gym
+from usm_cli.commands.bench import MEANINGS
+from usm_cli.commands.leaderboard import decision_times
+from usm_cli.speed import SpeedResult
+from usm_gym.support.text import figures
+
+FOLDER = Path(__file__).parents[2] / "results" / usm_gym.__version__
+VERDICT, SPEED = "<!-- verdict -->", "<!-- bench.json -->"
+
+
+def filled(text):
+    """A page with what its marks stand for."""
+    if VERDICT in text:
+        shown = verdict(leaderboard(), "results/verdict.svg", decision_times(FOLDER))
+        text = text.replace(VERDICT, shown)
+    return text.replace(SPEED, speed(FOLDER / "bench.json")) if SPEED in text else text
+
+
+@cache
+def leaderboard():
+    """The leaderboard of this version."""
+    return LeaderboardResult.read(FOLDER / "leaderboard.json")
+
+
+def speed(path):
+    """The figures of `usm bench` as a table, with the command and the machine."""
+    if not path.exists():
+        return "No measurement has been published with this version."
+    result = SpeedResult.read(path)
+    lines = ["| what | median | smallest | largest |", "|---|---:|---:|---:|"]
+    for name, meaning in MEANINGS.items():
+        if name in result.spread:
+            spread = result.spread[name]
+            numbers = " | ".join(map(figures, (spread.median, spread.low, spread.high)))
+            lines.append(f"| {meaning} | {numbers} |")
+    machine, source = result.machine, result.provenance
+    where = f"{machine.processor}, {machine.cores} cores, {machine.system}"
+    by = f"By `{source.command}`, commit {source.commit}, on {where}."
+    decisions = ["", "| a decision for one robot | median, us |", "|---|---:|"]
+    for id, spread in sorted(result.decisions.items(), key=lambda pair: pair[1].median):
+        decisions.append(f"| `{id}` | {figures(spread.median)} |")
+    return "\n".join([by, "", *lines, *decisions])
