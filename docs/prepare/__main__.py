@@ -14,11 +14,11 @@ import published
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "build" / "docs"
 # What of `docs` is part of the site.
-KINDS = (".md", ".svg", ".gif", ".css")
+KINDS = (".md", ".svg", ".gif", ".css", ".js")
 
 
 def prepare(folder, names=()):
-    """Write pages, pictures and style into a folder, or only those that are named."""
+    """Write pages, pictures, style and script into a folder, or only those that are named."""
     found = sources()
     made = {name: content(found[name]) for name in names or found}
     if not names:

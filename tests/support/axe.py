@@ -21,9 +21,10 @@ def violations(driver: Any) -> list[str]:
     Raises:
         RuntimeError: axe-core could not run.
     """
-    # The package has a recent axe-core; its own classes are for another driver.
-    script = resources.files("axe_playwright_python") / "axe.min.js"
-    driver.execute_script(script.read_text(encoding="utf-8"))
+    if not driver.execute_script("return window.axe !== undefined"):
+        # The package has a recent axe-core; its own classes are for another driver.
+        script = resources.files("axe_playwright_python") / "axe.min.js"
+        driver.execute_script(script.read_text(encoding="utf-8"))
     found = driver.execute_async_script(RUN)
     if isinstance(found, str):
         raise RuntimeError(found)

@@ -97,7 +97,7 @@ def verdict_table(rows: Mapping[str, Standing], decisions: Mapping[str, float]) 
         decisions: How long policies take for a decision, us, as far as it is known.
     """
     axes, places = axes_in(rows.values()), rank_labels(rows)
-    lines = [f"| | policy | why | error {' + '.join(axes)}, mm | variation, N/s | decision, µs |"]
+    lines = [f"| rank | policy | why | error {' + '.join(axes)}, mm | variation, N/s | decision, µs |"]
     lines.append("|---|---|---|---:|---:|---:|")
     for id, reasons in choices(rows).items():
         mean, margin = rows[id].combined
@@ -260,7 +260,7 @@ def csv_text(result: LeaderboardResult) -> str:
 
 def _head(columns: Sequence[str]) -> list[str]:
     told, *numbers = columns
-    head = f"| | policy | {told} | {' | '.join(numbers)} |"
+    head = f"| rank | policy | {told} | {' | '.join(numbers)} |"
     return [head, "|---|---|---|" + "---:|" * len(numbers)]
 
 
