@@ -7,7 +7,7 @@ function reach() {
     else box.removeAttribute("tabindex");
   }
   // The theme makes a landmark of every button that copies.
-  for (const buttons of document.querySelectorAll(".md-code__nav")) buttons.role = "group";
+  for (const buttons of document.querySelectorAll(".md-code__nav")) buttons.role = "none";
 }
 
 addEventListener("load", reach);

@@ -203,15 +203,22 @@ def address(site):
         server.shutdown()
 
 
+def shows(scheme):
+    """Whether a browser shows a page in a scheme of the theme, as something to wait for."""
+    script = f"return document.body.dataset.mdColorScheme === '{scheme}'"
+    return lambda browser: browser.execute_script(script)
+
+
 @pytest.mark.slow
 def test_axe_finds_nothing_wrong_with_a_page_of_the_site(site, address, browser):
+    from selenium.webdriver.support.wait import WebDriverWait
+
     found = {}
     for page in sorted(path.relative_to(site).as_posix() for path in site.rglob("*.html")):
         browser.get(f"{address}/{page}")
         for scheme, name in SCHEMES.items():
             media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
             browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
-            shown = browser.execute_script("return document.body.dataset.mdColorScheme")
-            assert shown == name, page
+            WebDriverWait(browser, 60).until(shows(name))
             found[page, scheme] = axe.violations(browser)
     assert not {at: wrong for at, wrong in found.items() if wrong}
