@@ -7,11 +7,14 @@ import shutil
 import tomllib
 from dataclasses import replace
 from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import pytest
 import usm_baselines
 from markdown_it import MarkdownIt
+from support import axe
 from support.trainings import brief, shorten
 from usm_agents.artifact.folder import PRETRAINED
 from usm_agents.learning import training
@@ -49,6 +52,7 @@ SHORTER_PYTHON = {
 LEFT_OUT = (
     "python3 -m venv",
     "python -m ",
+    "python docs/",
     "source ",
     "git ",
     ".venv/bin/",
@@ -60,6 +64,8 @@ LEFT_OUT = (
     "usm bench",
     "usm reproduce",
 )
+# The theme's names of the schemes that a reader may prefer.
+SCHEMES = {"light": "default", "dark": "slate"}
 
 
 def blocks(page):
@@ -147,22 +153,68 @@ def test_every_law_has_its_place_among_the_controllers():
     assert {re.sub("-(tuned|basin|sea)$", "", id) for id in laws} == shown
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path, monkeypatch):
-    short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
-    monkeypatch.setattr(usm_gym, "suite", lambda name: short)
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, whose figures have a short episode."""
     commands = pytest.importorskip("mkdocs.commands.build")
+    pages, made = tmp_path_factory.mktemp("pages"), tmp_path_factory.mktemp("site")
+    short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(usm_gym, "suite", lambda name: short)
+        runpy.run_path(str(ROOT / "docs" / "prepare"))["prepare"](pages)
     config = pytest.importorskip("mkdocs.config").load_config(
-        str(ROOT / "mkdocs.yml"), strict=True, site_dir=str(tmp_path)
+        str(ROOT / "mkdocs.yml"), strict=True, docs_dir=str(pages), site_dir=str(made)
     )
     config.plugins.run_event("startup", command="build", dirty=False)
     commands.build(config)
-    pages = list(tmp_path.rglob("*.html"))
-    model, laws = (
-        (tmp_path / name / "index.html").read_text(encoding="utf-8")
-        for name in ("model", "controllers")
+    return made
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(site):
+    front, model, laws = (
+        (site / name / "index.html").read_text(encoding="utf-8")
+        for name in ("", "model", "controllers")
     )
     assert "<mtable" in model
     assert laws.count("<svg") > 8
-    assert "<!-- law" not in laws
-    assert not [page for page in pages if "arithmatex" in page.read_text(encoding="utf-8")]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").partition("<details>")[0]
+    rows = re.findall(r"\| (`.+?`) \|.+\| ([\d.]+ ± [\d.]+) \|", readme)
+    assert len(rows) > 9
+    shown = re.findall(r"<td>(<code>.+?</code>)</td>.*?>([\d.]+ ± [\d.]+)</td>", front, re.DOTALL)
+    assert shown == [(f"<code>{id.strip('`')}</code>", error) for id, error in rows]
+
+
+@pytest.fixture(scope="module")
+def address(site):
+    """Where a server shows the site."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, *_):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=site)) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def shows(scheme):
+    """Whether a browser shows a page in a scheme of the theme, as something to wait for."""
+    script = f"return document.body.dataset.mdColorScheme === '{scheme}'"
+    return lambda browser: browser.execute_script(script)
+
+
+@pytest.mark.slow
+def test_axe_finds_nothing_wrong_with_a_page_of_the_site(site, address, browser):
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    found = {}
+    for page in sorted(path.relative_to(site).as_posix() for path in site.rglob("*.html")):
+        browser.get(f"{address}/{page}")
+        for scheme, name in SCHEMES.items():
+            media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+            browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+            WebDriverWait(browser, 60).until(shows(name))
+            found[page, scheme] = axe.violations(browser)
+    assert not {at: wrong for at, wrong in found.items() if wrong}

@@ -19,7 +19,7 @@ from usm_gym.support.validation import SAID, clipped
 
 
 class HelpFormatter(argparse.HelpFormatter):
-    """Fits texts into the terminal: fills paragraphs, and keeps indented lines, such as examples."""
+    """Fits texts into the terminal: fills paragraphs, keeps indented lines, such as examples."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         return "\n".join(

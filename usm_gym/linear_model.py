@@ -76,7 +76,7 @@ def linearise(
     The model is of one control period: thruster commands held, drag linear, the joints held at
     the operating point by their own controllers. No thruster saturates.
 
-    | state | size | unit | |
+    | state | size | unit | meaning |
     |---|---|---|---|
     | `position` | 2 | m | centre of mass, global frame (x, y) |
     | `heading` | 1 | rad | mean link angle |

@@ -67,7 +67,7 @@ class Vehicle:
         Every entry of the observation (docs/tasks.md) is an attribute, (..., size of the entry), an
         entry of one number included. Beside them there are
 
-        | attribute | size | unit | |
+        | attribute | size | unit | meaning |
         |---|---|---|---|
         | `velocity_error` | 2 | m/s | velocity minus that of the reference, global frame |
         | `link_angles` | links | rad | from the tail, against the x axis |
@@ -158,7 +158,7 @@ class Vehicle:
 
         In continuous time, x' = A x + B u, with the states
 
-        | state | size | unit | |
+        | state | size | unit | meaning |
         |---|---|---|---|
         | `position` | 2 | m | centre of mass, global frame (x, y) |
         | `heading` | 1 | rad | mean link angle |

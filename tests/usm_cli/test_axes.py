@@ -78,7 +78,7 @@ def test_a_leaderboard(axes, tmp_path):
     assert f"the means in {'a, b and c' if len(axes) == 3 else 'a'} added up" in markdown(result)
     columns = " | ".join(f"{axis}, mm" for axis in axes)
     error = f"error {' + '.join(axes)}, mm"
-    assert f"| | policy | {error} | {columns} | worst {' / '.join(axes)} |" in markdown(result)
+    assert f"| rank | policy | {error} | {columns} | worst {' / '.join(axes)} |" in markdown(result)
     assert f"worst {' / '.join(axes)} |" in brief_table(result.main)
     head, *lines = csv_text(result).splitlines()
     assert [name for name in head.split(",") if name.startswith("max_error") and name[-2] == "_"]

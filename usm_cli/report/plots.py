@@ -42,7 +42,8 @@ def front(
         weights: Points of policies tuned with other weights, by id, for the first panel.
     """
     besides = f" The thin line joins other weights of {', '.join(weights)}." if weights else ""
-    panels, missing = [], 0
+    panels: list[dict[str, Any]] = []
+    missing = 0
     for name, rows in tiers.items():
         points: list[dict[str, Any]] = [
             {"name": id, "x": variation, "y": 1e3 * row.combined[0]}

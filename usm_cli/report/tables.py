@@ -228,10 +228,9 @@ class LogScale:
         low, high = error.ci95
         mean = self._place(error.mean)
         beyond = "‹" if mean < 0 else "›" if mean > 100 else ""
-        seen = (
-            min(max(self._place(at), 0.0), 100.0) for at in (low, error.mean, high, error.worst)
-        )
-        return Mark(*seen, beyond)
+        places = (self._place(at) for at in (low, error.mean, high, error.worst))
+        seen = [min(max(place, 0.0), 100.0) for place in places]
+        return Mark(seen[0], seen[1], seen[2], seen[3], beyond)
 
     def _place(self, metres: float) -> float:
         power = math.log10(metres) if metres > 0 else -math.inf

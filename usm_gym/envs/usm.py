@@ -45,7 +45,7 @@ class USMEnv(TrackingEnv):
 
     ## Observation
 
-    `Box(float32)` of 90 numbers, the same in both modes: physical value over scale. Every error is
+    `Box(float32)` of 94 numbers, the same in both modes: physical value over scale. Every error is
     actual minus reference. Angles are never wrapped. The true velocity of the centre of mass, the
     current and the true coefficients are not observed.
 

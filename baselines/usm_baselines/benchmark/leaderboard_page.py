@@ -73,7 +73,7 @@ def table(rows: Mapping[str, Standing]) -> str:
     columns += ["variation, N/s", "lost"]
     columns += [*(["over informed"] if ratios else []), "beats the next"]
     lines = [f"| | policy | {' | '.join(columns)} | told |"]
-    lines.append(f"|---|---|{'---:|' * len(columns)}---|")
+    lines.append(f"|---:|---|{'---:|' * len(columns)}---|")
     for id, row in rows.items():
         mean, margin = row.combined
         errors, lead = row.errors.values(), row.beats_next
@@ -96,8 +96,10 @@ def verdict_table(rows: Mapping[str, Standing], decisions: Mapping[str, float]) 
         decisions: How long policies take for a decision, us, as far as it is known.
     """
     axes, places = axes_in(rows.values()), rank_labels(rows)
-    lines = [f"| | policy | why | error {' + '.join(axes)}, mm | variation, N/s | decision, µs |"]
-    lines.append("|---|---|---|---:|---:|---:|")
+    lines = [
+        f"| rank | policy | why | error {' + '.join(axes)}, mm | variation, N/s | decision, µs |"
+    ]
+    lines.append("|---:|---|---|---:|---:|---:|")
     for id, reasons in choices(rows).items():
         mean, margin = rows[id].combined
         cells = [places[id], f"`{id}`", ", ".join(reasons), give_or_take(1e3 * mean, 1e3 * margin)]
@@ -190,13 +192,25 @@ def markdown(result: LeaderboardResult) -> str:
     return "\n".join(parts)
 
 
-def readme_block(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
-    """The verdict in every tier, and the whole table of the main suite, between their marks."""
+def verdict(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
+    """The verdict in every tier: the figure, and the policies to choose from.
+
+    Args:
+        result: The leaderboard.
+        figure: Where the figure is, from the page.
+        decisions: As of `verdict_table`.
+    """
     axes = " + ".join(result.axes)
-    parts = [MARKS[0], f"![Error {axes} against thrust variation, tier by tier]({figure})\n"]
+    parts = [f"![Error {axes} against thrust variation, tier by tier]({figure})\n"]
     for tier, name in CROSSED.items():
         if name in result.suites:
             parts += [f"**In `{tier}`**\n", verdict_table(result.suites[name], decisions)]
+    return "\n".join(parts)
+
+
+def readme_block(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
+    """The verdict, and the whole table of the main suite, between their marks."""
+    parts = [MARKS[0], verdict(result, figure, decisions)]
     parts.append(f"<details><summary>All {len(result.main)} policies in `field`</summary>\n")
     parts += [brief_table(result.main), "</details>", MARKS[1], ""]
     return "\n".join(parts)
@@ -249,8 +263,8 @@ def csv_text(result: LeaderboardResult) -> str:
 
 def _head(columns: Sequence[str]) -> list[str]:
     told, *numbers = columns
-    head = f"| | policy | {told} | {' | '.join(numbers)} |"
-    return [head, "|---|---|---|" + "---:|" * len(numbers)]
+    head = f"| rank | policy | {told} | {' | '.join(numbers)} |"
+    return [head, "|---:|---|---|" + "---:|" * len(numbers)]
 
 
 def _line(place: str, id: str, row: Standing, cells: Sequence[str]) -> str:

@@ -4,8 +4,8 @@ import base64
 import json
 
 
-def files(path, source):
-    """The page of a notebook and its pictures, by their names.
+def parts(path, source):
+    """The page of a notebook, and its pictures by their names.
 
     Args:
         path: The notebook.
@@ -27,4 +27,4 @@ def files(path, source):
             else:
                 blocks.append(f"```text\n{''.join(data['text/plain']).rstrip()}\n```")
     blocks.insert(1, f"From `{source}`, with what it found when it was run.")
-    return {f"{path.stem}.md": "\n\n".join(blocks), **pictures}
+    return "\n\n".join(blocks), pictures

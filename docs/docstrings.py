@@ -10,7 +10,7 @@ class RuntimeDocstrings(griffe.Extension):
     """Takes docstrings with a table of the observation from the classes themselves."""
 
     def on_class(self, *, cls, **_):
-        """Replace such a docstring."""
+        """Replace such a docstring, whose headings come one level below that of the class."""
         if cls.docstring and "OBSERVATION_TABLE" in cls.docstring.value:
             runtime = getattr(importlib.import_module(cls.module.path), cls.name)
-            cls.docstring.value = inspect.getdoc(runtime)
+            cls.docstring.value = inspect.getdoc(runtime).replace("\n## ", "\n# ")

@@ -1,41 +1,38 @@
-"""Adds pages, results, notebooks and speed from the rest of the repository to the site."""
+"""Puts the verdict and the measured speed in their places."""
 
+from functools import cache
 from pathlib import Path
 
-import notebook_page
-from mkdocs.structure.files import File
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
+from usm_baselines.benchmark.leaderboard_page import verdict
 
 import usm_gym
 from usm_cli.commands.bench import MEANINGS, findings
+from usm_cli.commands.leaderboard import decision_times
 from usm_cli.speed import SpeedResult
 from usm_gym.support.text import figures
 
-ROOT = Path(__file__).parents[2]
-RESULTS = ROOT / "results" / usm_gym.__version__
+FOLDER = Path(__file__).parents[2] / "results" / usm_gym.__version__
+VERDICT = "<!-- verdict -->"
 SPEED, FINDINGS = "<!-- bench.json -->", "<!-- bench.json: findings -->"
 
 
-def on_files(files, config):
-    """Add what lies outside `docs`."""
-    outside = {name: ROOT / name for name in ("CONTRIBUTING.md", "CHANGELOG.md")}
-    for kind in ("md", "png", "svg"):
-        for path in sorted(RESULTS.rglob(f"*.{kind}")):
-            outside[f"results/{path.relative_to(RESULTS).as_posix()}"] = path
-    for place, path in outside.items():
-        files.append(File.generated(config, place, abs_src_path=str(path)))
-    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
-        for name, content in notebook_page.files(path, f"notebooks/{path.name}").items():
-            files.append(File.generated(config, f"notebooks/{name}", content=content))
-    return files
+def filled(text):
+    """A page with what its marks stand for."""
+    if VERDICT in text:
+        shown = verdict(leaderboard(), "results/verdict.svg", decision_times(FOLDER))
+        text = text.replace(VERDICT, shown)
+    if SPEED in text:
+        path = FOLDER / "bench.json"
+        said = findings(SpeedResult.read(path).spread) if path.exists() else []
+        text = text.replace(FINDINGS, "\n\n".join(said)).replace(SPEED, speed(path))
+    return text
 
 
-def on_page_markdown(markdown, **_):
-    """Put the measured speed in its place."""
-    if SPEED not in markdown:
-        return markdown
-    path = RESULTS / "bench.json"
-    said = findings(SpeedResult.read(path).spread) if path.exists() else []
-    return markdown.replace(FINDINGS, "\n\n".join(said)).replace(SPEED, speed(path))
+@cache
+def leaderboard():
+    """The leaderboard of this version."""
+    return LeaderboardResult.read(FOLDER / "leaderboard.json")
 
 
 def speed(path):

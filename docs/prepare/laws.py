@@ -1,22 +1,18 @@
 """Adds gains, an episode and scores to every law on the page of the controllers."""
 
 import re
-from functools import cache
-from pathlib import Path
 
 import figures
+import published
 import usm_baselines
-from mkdocs.exceptions import PluginError
-from usm_baselines.benchmark.leaderboard import LeaderboardResult
 from usm_baselines.gains import FOLDERS
 from usm_baselines.registry import entry
 from usm_baselines.space import declared
 
-import usm_gym
 from usm_gym.support.text import figures as in_figures
 from usm_gym.support.text import mm
+from usm_gym.support.validation import require
 
-LEADERBOARD = Path(__file__).parents[2] / "results" / usm_gym.__version__ / "leaderboard.json"
 SHOWN = {
     "operation": "field",
     "operation-ideal": "ideal",
@@ -27,11 +23,11 @@ SHOWN = {
 PLACE = re.compile(r"<!-- law: (.+?) -->")
 
 
-def on_page_markdown(markdown, **_):
-    """Put laws in their places."""
-    laws = [ids.split(", ") for ids in PLACE.findall(markdown)]
+def filled(text):
+    """A page with laws in their places."""
+    laws = [ids.split(", ") for ids in PLACE.findall(text)]
     everyone = [id for ids in laws for id in shipped(ids)]
-    return PLACE.sub(lambda match: law(match[1].split(", "), everyone), markdown)
+    return PLACE.sub(lambda match: law(match[1].split(", "), everyone), text)
 
 
 def law(ids, everyone):
@@ -51,8 +47,7 @@ def shipped(ids):
     """Policies, each followed by the forms of it that are tuned."""
     known = usm_baselines.ids()
     for id in ids:
-        if id not in known:
-            raise PluginError(f"law is {id}; allowed: {', '.join(known)}")
+        require(id in known, "law", id, ", ".join(known))
     gains = ("", *(f"-{suffix}" for suffix in FOLDERS))
     return [id + kind for id in ids for kind in gains if id + kind in known]
 
@@ -82,7 +77,7 @@ def made(id):
 
 def scores(ids):
     """The rows of policies in the leaderboard."""
-    board = leaderboard()
+    board = published.leaderboard()
     lines = [
         row(
             f"{' / '.join(board.axes)}, mm",
@@ -103,12 +98,6 @@ def scores(ids):
 def errors(score):
     """Mean errors of a row of the leaderboard, if the policy is meant for the suite."""
     return "" if score is None else " / ".join(mm(error.mean) for error in score.errors.values())
-
-
-@cache
-def leaderboard():
-    """The leaderboard of this version."""
-    return LeaderboardResult.read(LEADERBOARD)
 
 
 def row(*cells):

@@ -1,0 +1,63 @@
+"""Writes the pages of the site, complete, for the program that makes HTML of them.
+
+`python docs/prepare` fills `build/docs`; `python docs/prepare tasks.md` renews one page there.
+"""
+
+import sys
+from pathlib import Path
+
+import formulas
+import laws
+import notebook_page
+import published
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "build" / "docs"
+# What of `docs` is part of the site.
+KINDS = (".md", ".svg", ".gif", ".css", ".js")
+
+
+def prepare(folder, names=()):
+    """Write pages, pictures and style into a folder, or only those that are named."""
+    found = sources()
+    made = {}
+    for name in names or found:
+        made |= content(name, found[name])
+    if not names:
+        for path in folder.rglob("*"):
+            if path.is_file() and path.relative_to(folder).as_posix() not in made:
+                path.unlink()
+    for name, written in made.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(written)
+
+
+def sources():
+    """The file of every page, picture and style, by its place on the site."""
+    found = {path.name: path for path in (ROOT / "docs").iterdir() if path.suffix in KINDS}
+    found |= {name: ROOT / name for name in ("CONTRIBUTING.md", "CHANGELOG.md")}
+    for kind in ("md", "png", "svg"):
+        for path in published.FOLDER.rglob(f"*.{kind}"):
+            found[f"results/{path.relative_to(published.FOLDER).as_posix()}"] = path
+    for path in (ROOT / "notebooks").glob("*.ipynb"):
+        found[f"notebooks/{path.stem}.md"] = path
+    return found
+
+
+def content(name, path):
+    """What the site shows of a file, by place: of a notebook a page and its pictures."""
+    if path.suffix == ".ipynb":
+        text, pictures = notebook_page.parts(path, path.relative_to(ROOT).as_posix())
+        beside = {f"{Path(name).parent.as_posix()}/{each}": data for each, data in pictures.items()}
+        return {name: filled(text)} | beside
+    return {name: filled(path.read_text("utf-8")) if path.suffix == ".md" else path.read_bytes()}
+
+
+def filled(text):
+    """A page with what its marks and formulas stand for."""
+    return formulas.drawn(laws.filled(published.filled(text))).encode()
+
+
+if __name__ == "__main__":
+    prepare(FOLDER, sys.argv[1:])
