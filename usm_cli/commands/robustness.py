@@ -29,6 +29,7 @@ from usm_cli.selection import (
     seeds,
 )
 from usm_cli.terminal import empty_table, output_console
+from usm_gym.rendering.plots import plotting, save
 from usm_gym.support.results import Provenance
 from usm_gym.support.text import degrees, mm
 from usm_gym.support.validation import require
@@ -38,8 +39,8 @@ Vary one quantity of a suite, with all else equal, and score policies at every v
 keep the nominal knowledge of the suite; they always know the true control period. What is counted
 in control periods changes with that. The table has the mean of the largest errors and of the
 largest heading error, and how many robots are lost; the figure has the errors of the robots that
-are not lost, and the share of those that are. Writes QUANTITY.json and QUANTITY.png (extra
-`render`) into a folder. After an interruption, run it again to continue.
+are not lost, and the share of those that are. Writes QUANTITY.json, and the figure as PNG and SVG
+(extra `render`), into a folder. After an interruption, run it again to continue.
 """
 EXAMPLES = f"""\
 quantities:
@@ -89,8 +90,8 @@ def run(arguments: argparse.Namespace) -> None:
         provenance=Provenance.here(seeds(arguments)),
     )
     result.write(folder / f"{arguments.vary}.json")
-    figure = robustness_figure.draw(result)
-    figure.savefig(folder / f"{arguments.vary}.png", dpi=120, metadata={"Software": None})
+    with plotting():
+        save(robustness_figure.draw(result), folder / arguments.vary)
     output_console().print(table(result))
     leave_if_refused(result.refused)
 

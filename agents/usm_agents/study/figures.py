@@ -10,6 +10,7 @@ import numpy as np
 from usm_baselines.benchmark.results import shifts_in
 
 from usm_agents.study.results import HomeResult, Scored, StudyResult, Trained
+from usm_gym.rendering.plots import plotting, save
 from usm_gym.statistics import performance_profile
 from usm_gym.task.metrics import MAX_ERROR
 
@@ -20,26 +21,20 @@ THRESHOLDS = 100
 
 
 def draw_all(study: StudyResult, folder: Path) -> None:
-    """Draw the figures of every home into a folder; PNG.
+    """Draw the figures of every home into a folder, as PNG and SVG.
 
     They are learning curves, error against thrust variation, performance profiles, errors by shift
     and spectra of the forces, the last two where there are some.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    for name, home in study.homes.items():
-        drawn = {"curves": _curves(home), "front": _front(home), "profiles": _profiles(home)}
-        if shifts_in(row.home for row in home.competing.values()):
-            drawn["shifts"] = _shifts(home)
-        if home.dissected:
-            drawn["spectra"] = _spectra(home)
-        for kind, figure in drawn.items():
-            path = folder / f"{name}-{kind}.png"
-            figure.savefig(path, dpi=120, metadata={"Software": None})
-            plt.close(figure)
+    with plotting():
+        for name, home in study.homes.items():
+            drawn = {"curves": _curves(home), "front": _front(home), "profiles": _profiles(home)}
+            if shifts_in(row.home for row in home.competing.values()):
+                drawn["shifts"] = _shifts(home)
+            if home.dissected:
+                drawn["spectra"] = _spectra(home)
+            for kind, figure in drawn.items():
+                save(figure, folder / f"{name}-{kind}")
 
 
 def _curves(home: HomeResult) -> Any:

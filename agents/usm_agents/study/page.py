@@ -90,28 +90,28 @@ def section(name: str, home: HomeResult, half: int) -> list[str]:
     if home.agents:
         parts += ["### Agents\n", tables.scores(home.agents)]
     parts += ["### Their rivals\n", tables.scores(home.rivals)]
-    parts += [f"![Error against thrust variation]({name}-front.png)\n"]
-    parts += [f"![Share of episodes up to an error]({name}-profiles.png)\n"]
+    parts += [f"![Error against thrust variation]({name}-front.svg)\n"]
+    parts += [f"![Share of episodes up to an error]({name}-profiles.svg)\n"]
     if home.agents:
         parts += ["### Agents against their rivals\n", AGAINST.format(**words)]
         for agent in home.agents:
             parts += [f"#### {agent}\n", tables.against(home.against[agent], home)]
     if shifts_in(row.home for row in home.competing.values()):
         parts += ["### Shift by shift\n", SHIFTS.format(**words), tables.shifts(home)]
-        parts += [f"![Error by shift]({name}-shifts.png)\n"]
+        parts += [f"![Error by shift]({name}-shifts.svg)\n"]
     parts += ["### Elsewhere\n", ELSEWHERE.format(**words), tables.elsewhere(home)]
     if home.agents:
         parts += [TRANSFER.format(**words), tables.transfer(home)]
     if home.dissected:
         parts += ["### What the agents do to their bases\n", DISSECTED.format(**words)]
-        parts += [tables.taken(home.dissected), f"![Spectra of the forces]({name}-spectra.png)\n"]
+        parts += [tables.taken(home.dissected), f"![Spectra of the forces]({name}-spectra.svg)\n"]
     if len(home.agents) > 1:
         parts += ["### How soon\n", SOON.format(**words), tables.soon(home.agents)]
     if home.ablations:
         parts += ["### Ablations\n", ABLATIONS.format(**words), tables.scores(home.ablations)]
         if ABLATED in home.agents:
             parts += [tables.against_ablated({n: home.against[n][ABLATED] for n in home.ablations})]
-    parts += ["### Learning curves\n", f"![Error against steps]({name}-curves.png)\n"]
+    parts += ["### Learning curves\n", f"![Error against steps]({name}-curves.svg)\n"]
     return parts
 
 

@@ -17,16 +17,13 @@ from usm_baselines.benchmark.leaderboard import (
 )
 from usm_baselines.benchmark.results import axes_in
 from usm_baselines.benchmark.verdict import REASONS, choices, front
+from usm_gym.rendering.plots import COLOURS, plotting, save
 from usm_gym.statistics import performance_profile
 from usm_gym.support.text import figures
 from usm_gym.task.metrics import MAX_ERROR
 
-# Of Okabe and Ito, to be told apart by all eyes, one for each reason to be in focus; the others
-# are grey.
-COLOURS = ("#0072b2", "#d55e00", "#56b4e9", "#009e73", "#cc79a7", "#e69f00")
+# There is a colour for each reason to be in focus; the others are grey.
 GREY, LIGHT, INK = "0.72", "0.85", "0.25"
-# An equal seed makes equal files.
-SVG: Any = {"svg.hashsalt": "usm-gym", "svg.fonttype": "none", "font.size": 9}
 # Errors beyond so many times the largest one in focus are off the figure.
 ROOM = 2.0
 # The height of a line of labels, points.
@@ -36,18 +33,11 @@ LABEL: dict[str, Any] = {"fontsize": 8, "color": INK}
 
 def draw_all(result: LeaderboardResult, folder: Path) -> None:
     """Draw error against thrust variation, profiles and errors into a folder, as PNG and SVG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    with plt.rc_context(SVG):
+    with plotting():
         drawn = {"verdict": _verdict(result), "profiles": _profiles(result.main)}
         drawn |= {f"errors-{slug(name)}": _errors(rows) for name, rows in result.suites.items()}
         for name, figure in drawn.items():
-            figure.savefig(folder / f"{name}.png", dpi=120, metadata={"Software": None})
-            figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
-            plt.close(figure)
+            save(figure, folder / name)
 
 
 def slug(suite: str) -> str:

@@ -20,9 +20,6 @@ def draw(result: RobustnessResult) -> Any:
     The errors are those of the robots that are not lost; the open points are without some. Where
     any robot is lost, one more panel has the share of the lost ones.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
     curves = result.scored

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,8 +22,8 @@ from usm_baselines.paper.reproduction import (
     at_step,
 )
 from usm_gym.rendering.look import ERROR_COLOURS
+from usm_gym.rendering.plots import plotting, save
 from usm_gym.robot import Robot
-from usm_gym.support.files import write_text
 from usm_gym.support.text import figures
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import named
@@ -45,19 +43,10 @@ CAPTIONS = {
 }
 NAMES = ("table1", *CAPTIONS, "theorem1")
 COLOURS = [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in ERROR_COLOURS]
-# An equal seed makes equal files.
-STYLE: Any = {
-    "svg.hashsalt": "usm-gym",
-    "svg.fonttype": "none",
-    "font.size": 9,
-    "legend.frameon": False,
-    # Of Okabe and Ito, to be told apart by all eyes.
-    "axes.prop_cycle": "cycler('color', ['#0072b2', '#d55e00', '#009e73', '#cc79a7'])",
-}
+# A colour of the cycle stands for an axis or a case.
+CYCLE = {"axes.prop_cycle": "cycler('color', ['#0072b2', '#d55e00', '#009e73', '#cc79a7'])"}
 # A line is drawn through the smallest and largest number in each of so many intervals.
 INTERVALS = 300
-# Digits of a place after the second decimal.
-SURPLUS = re.compile(r"(\.\d\d)\d+")
 
 
 def draw(names: Sequence[str], result: ReproductionResult, records: Records, folder: Path) -> None:
@@ -69,11 +58,6 @@ def draw(names: Sequence[str], result: ReproductionResult, records: Records, fol
         records: The runs behind it, by row and mode.
         folder: Where to write.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
     drawers: dict[str, Callable[[Record, str, str], Any]] = {
         "fig03": _bodies,
         "fig04": _bodies,
@@ -84,7 +68,7 @@ def draw(names: Sequence[str], result: ReproductionResult, records: Records, fol
         "fig09": _signals,
         "fig10": _errors,
     }
-    with plt.rc_context(STYLE):
+    with plotting(**CYCLE):
         for name in names:
             if name == "table1":
                 figure = _table(result)
@@ -96,19 +80,6 @@ def draw(names: Sequence[str], result: ReproductionResult, records: Records, fol
                 number = int(name[3:])
                 figure.suptitle(f"{caption} (our run, to lay beside Fig. {number})", fontsize=10)
             save(figure, folder / name)
-
-
-def save(figure: Any, path: Path) -> None:
-    """Write a figure as PNG and SVG, and forget it; `path` lacks the ending."""
-    from matplotlib import pyplot as plt
-
-    figure.savefig(path.with_suffix(".png"), dpi=120, metadata={"Software": None})
-    drawn = io.StringIO()
-    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
-    plt.close(figure)
-    # A hundredth of a point is fine enough for a line, and makes a small file.
-    short = re.sub(r' d="[^"]+"', lambda way: SURPLUS.sub(r"\1", way[0]), drawn.getvalue())
-    write_text(path.with_suffix(".svg"), short)
 
 
 def link_ends(record: Record, sample: int, robot: Robot) -> Array:

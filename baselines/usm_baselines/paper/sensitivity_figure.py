@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from usm_baselines.paper.reproduction import PAPER, PARTS
-from usm_baselines.paper.reproduction_figures import STYLE, save
+from usm_baselines.paper.reproduction_figures import CYCLE
 from usm_baselines.paper.sensitivity import (
     PERIODS,
     ROWS,
@@ -17,6 +17,7 @@ from usm_baselines.paper.sensitivity import (
     variations,
 )
 from usm_baselines.paper.sensitivity_result import Outcome, SensitivityResult
+from usm_gym.rendering.plots import plotting, save
 
 MARKERS = "oxs^"
 
@@ -28,13 +29,10 @@ def draw_study(study: SensitivityResult, path: Path) -> None:
         study: The study.
         path: Where to write PNG and SVG; it lacks the ending.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
     sheet = Sheet(study)
-    with plt.rc_context(STYLE):
+    with plotting(**CYCLE):
         figure = plt.figure(figsize=(20, 13), layout="constrained")
         grid = figure.add_gridspec(2, 4, width_ratios=(1.25, 1.25, 1, 1))
         sheet.numbers(figure.add_subplot(grid[:, :2]))

@@ -47,9 +47,9 @@ def test_all_rows_of_a_table_have_its_columns(made):
 def test_the_page_shows_the_figures_that_are_drawn(made, tmp_path, monkeypatch):
     monkeypatch.setattr(statistics, "RESAMPLES", 100)
     draw_all(made, tmp_path)
-    shown = re.findall(r"\]\((.*\.png)\)", page.markdown(made))
-    assert sorted(shown) == sorted(path.name for path in tmp_path.iterdir())
-    assert "sea-shifts.png" in shown
+    shown = re.findall(r"\]\((.*\.svg)\)", page.markdown(made))
+    assert sorted(shown) == sorted(path.name for path in tmp_path.glob("*.svg"))
+    assert "sea-shifts.svg" in shown
 
 
 def test_a_study_of_an_older_plant_says_so_in_its_head(made):
