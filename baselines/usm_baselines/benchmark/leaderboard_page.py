@@ -72,7 +72,7 @@ def table(rows: Mapping[str, Standing]) -> str:
     columns += [f"{angle}, °" for angle in attitude_in(rows.values())]
     columns += ["variation, N/s", "lost"]
     columns += [*(["over informed"] if ratios else []), "beats the next"]
-    lines = [f"| | policy | {' | '.join(columns)} | told |"]
+    lines = [f"| rank | policy | {' | '.join(columns)} | told |"]
     lines.append(f"|---:|---|{'---:|' * len(columns)}---|")
     for id, row in rows.items():
         mean, margin = row.combined
