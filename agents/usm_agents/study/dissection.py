@@ -152,14 +152,16 @@ def welch(force: Array, period: float) -> tuple[Array, Array]:
 def dissected(home: Home, chosen: Sequence[StudyTraining]) -> dict[str, Dissection]:
     """What the agents that add to the thrust in `field` do to it, as their seed 0; see `dissect`.
 
-    In the other tiers the oracle, behind lag, dead-bands and gains, does not tell what was needed.
+    In the other tiers the oracle, behind lag, dead-bands and gains, does not tell what was needed;
+    and nothing can be taken from a base that asks for no force.
     """
     made: dict[str, Dissection] = {}
     if home.tier != "field":
         return made
     for training in chosen:
         plan = training.plan
-        if training.name in AGENTS and plan.seed == 0 and plan.action != "estimates":
+        adds = plan.action != "estimates" and plan.base != "heading"
+        if training.name in AGENTS and plan.seed == 0 and adds:
             episodes = unseen(home.mode, PRESETS[home.tier], TEST_SEED, EPISODES)
             nominal = shared_nominal(episodes)
             policy = make_agent(nominal, str(training.folder))

@@ -52,7 +52,8 @@ DISSECTED = """\
 Standard deviations of the force that the base commands alone, and with the agent; of the residual;
 and of the force that was needed, which is the oracle's in the same episode. The residual is split
 by least squares into a share of what the base commands in excess of it, taken back, and a share of
-the needed force; "late" is by how much the whole force follows the needed one. {axes}.
+the needed force; "late" is by how much the whole force follows the needed one, up to 200 ms.
+{axes}.
 """
 SOON = """\
 Steps, in millions, after which the best agents so far are as good as the best ones of another
