@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from support.episodes import short
 from support.results import PROVENANCE, evaluation, scores, study
+from usm_agents.study.results import StudyResult
 from usm_baselines.benchmark.leaderboard import LeaderboardResult
 from usm_baselines.benchmark.results import ComparisonResult, Difference, EvaluationResult
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult, ScoredPoint
@@ -127,10 +128,16 @@ def test_a_result_is_read_as_it_was_written(kind, tmp_path):
     assert document.get("kind", result.kind) == result.kind
 
 
-@pytest.mark.parametrize("name", ["leaderboard.json", "bench.json"])
+PUBLISHED = {
+    "leaderboard.json": LeaderboardResult,
+    "bench.json": SpeedResult,
+    "study/study.json": StudyResult,
+}
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
 def test_published_results_are_written_again_as_they_are(name, tmp_path):
-    kinds = {"leaderboard.json": LeaderboardResult, "bench.json": SpeedResult}
-    kinds[name].read(STORED / name).write(tmp_path / "again.json")
+    PUBLISHED[name].read(STORED / name).write(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_bytes() == (STORED / name).read_bytes()
 
 
