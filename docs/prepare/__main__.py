@@ -24,6 +24,7 @@ def prepare(folder, names=()):
     for name in names or found:
         made |= content(name, found[name])
     if not names:
+        made["results/report.html"] = published.report()
         for path in folder.rglob("*"):
             if path.is_file() and path.relative_to(folder).as_posix() not in made:
                 path.unlink()

@@ -1,7 +1,8 @@
-"""Puts the verdict and the measured speed in their places."""
+"""Puts the verdict and the measured speed in their places, and the report beside them."""
 
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from usm_baselines.benchmark.leaderboard import LeaderboardResult
 from usm_baselines.benchmark.leaderboard_page import verdict
@@ -9,12 +10,24 @@ from usm_baselines.benchmark.leaderboard_page import verdict
 import usm_gym
 from usm_cli.commands.bench import MEANINGS, findings
 from usm_cli.commands.leaderboard import decision_times
+from usm_cli.program import main
 from usm_cli.speed import SpeedResult
 from usm_gym.support.text import figures
 
 FOLDER = Path(__file__).parents[2] / "results" / usm_gym.__version__
 VERDICT = "<!-- verdict -->"
 SPEED, FINDINGS = "<!-- bench.json -->", "<!-- bench.json: findings -->"
+# Whose episodes the report replays; others would make it large.
+REPLAYED = "estimator-lqg-joints,adaptive,sta"
+
+
+def report():
+    """The leaderboard as the page that `usm report` makes."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "report.html"
+        result = str(FOLDER / "leaderboard.json")
+        main(["report", result, "--policies", REPLAYED, "--output", str(path)])
+        return path.read_bytes()
 
 
 def filled(text):
