@@ -16,7 +16,7 @@ from usm_baselines.benchmark.leaderboard import (
     best_of_laws,
 )
 from usm_baselines.benchmark.results import axes_in
-from usm_baselines.benchmark.verdict import REASONS, choices, front
+from usm_baselines.benchmark.verdict import REASONS, TIERS, choices, front
 from usm_gym.rendering.plots import COLOURS, plotting, save
 from usm_gym.statistics import performance_profile
 from usm_gym.support.text import figures
@@ -54,10 +54,9 @@ def _verdict(result: LeaderboardResult) -> Any:
     figure, panels = plt.subplots(1, len(tiers), figsize=size, squeeze=False, layout="constrained")
     for panel, (tier, rows) in zip(panels[0], tiers.items(), strict=True):
         panel.set_title(tier, fontweight="bold", loc="left")
+        panel.set_title(TIERS[tier], fontsize=8, color=INK, loc="right")
         panel.set(xscale="log", yscale="log", xlabel="thrust variation [N/s]")
         _pareto(panel, rows)
-        if rows is result.main:
-            _other_weights(panel, result)
     axes = " + ".join(result.axes)
     panels[0, 0].set_ylabel(f"largest error after settling, {axes} [mm]")
     figure.draw_without_rendering()  # so that labels know where the points are
@@ -102,14 +101,6 @@ def _pareto(panel: Any, rows: Mapping[str, Standing]) -> None:
     _plain(panel)
 
 
-def _other_weights(panel: Any, result: LeaderboardResult) -> None:
-    """What else the laws can do that are tuned with other weights of thrust variation."""
-    for points in result.front.values():
-        errors = [1e3 * sum(point.errors.values()) for point in points]
-        variations = [point.thrust_variation for point in points]
-        panel.plot(variations, errors, color=GREY, linewidth=0.8, zorder=0)
-
-
 def focus(rows: Mapping[str, Standing]) -> dict[str, str]:
     """The policies that are named, with their colours."""
     colours = dict(zip(REASONS, COLOURS, strict=True))
@@ -125,6 +116,9 @@ def _places(rows: Mapping[str, Standing], names: Iterable[str]) -> dict[str, tup
 
 def _label(panel: Any, places: Mapping[str, tuple[float, float]]) -> None:
     """Name points beside them, on the side with more room, without names on one another."""
+    from matplotlib import patheffects
+
+    halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
     middle = panel.get_window_extent().get_points()[:, 0].mean()
     seen = {id: panel.transData.transform(at) for id, at in places.items()}
     taken: list[tuple[bool, float]] = []
@@ -142,6 +136,7 @@ def _label(panel: Any, places: Mapping[str, tuple[float, float]]) -> None:
             **LABEL,
             ha="right" if right else "left",
             va="center",
+            path_effects=halo,
         )
 
 

@@ -27,12 +27,18 @@ from usm_baselines.benchmark.results import (
     rms_in,
     shifts_in,
 )
-from usm_baselines.benchmark.verdict import choices
+from usm_baselines.benchmark.verdict import BEST, TIERS, UNLEARNED, choices
 from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.support.text import degrees, figures, give_or_take, listed, mm
 from usm_gym.support.validation import require
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
+# The tier of which the verdict speaks first.
+TANK = "basin"
+FIGURE = """\
+Further down and to the left is better. Grey dots are all other policies; nobody is beyond the grey
+line. Dotted is `informed`, which knows all constants of an episode and does not compete.
+"""
 MARKS = ("<!-- leaderboard -->", "<!-- end of leaderboard -->")
 # Marks a policy about whose scores there is a note.
 MARK = "†"
@@ -201,11 +207,28 @@ def verdict(result: LeaderboardResult, figure: str, decisions: Mapping[str, floa
         decisions: As of `verdict_table`.
     """
     axes = " + ".join(result.axes)
-    parts = [f"![Error {axes} against thrust variation, tier by tier]({figure})\n"]
-    for tier, name in CROSSED.items():
-        if name in result.suites:
-            parts += [f"**In `{tier}`**\n", verdict_table(result.suites[name], decisions)]
+    tiers = {tier: result.suites[name] for tier, name in CROSSED.items() if name in result.suites}
+    parts = [f"{advice(tiers[TANK], decisions)}\n"] if TANK in tiers else []
+    parts += [f"![Error {axes} against thrust variation, tier by tier]({figure})\n", FIGURE]
+    for tier, rows in tiers.items():
+        parts += [f"**In `{tier}`**, {TIERS[tier]}\n", verdict_table(rows, decisions)]
     return "\n".join(parts)
+
+
+def advice(rows: Mapping[str, Standing], decisions: Mapping[str, float]) -> str:
+    """What to take, with its error, thrust variation and time, in a sentence."""
+    found = {reason: id for id, reasons in choices(rows).items() for reason in reasons}
+
+    def cost(id: str) -> str:
+        mean, margin = rows[id].combined
+        error = f"{give_or_take(1e3 * mean, 1e3 * margin)} mm"
+        variation = f"{figures(rows[id].metrics['thrust_variation'].mean)} N/s"
+        took = [f"{figures(1e-3 * decisions[id])} ms per decision"] if id in decisions else []
+        return ", ".join([f"`{id}` ({error}", variation, *took]) + ")"
+
+    best, plain = (found[reason] for reason in (BEST, UNLEARNED))
+    instead = "" if plain == best else f", or without a network {cost(plain)}"
+    return f"**For a tank, take {cost(best)}{instead}.** So far, all of this is simulation."
 
 
 def readme_block(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:

@@ -16,17 +16,25 @@ FORESIGHT = "joint references"
 # The paper's law.
 LAW = PAPER[0]
 # The row that is told all constants of an episode.
-LIMIT = "the limit: told all constants"
+TOLD_ALL = "for comparison: knows all constants"
 
+# What a tier stands for.
+TIERS = {
+    "field": "positions at once, with little noise",
+    "basin": "a tank: positions rare and late",
+    "sea": "open water: positions rare, late and noisy, and waves",
+}
+
+BEST, UNLEARNED = "best overall", "best without learning"
 REASONS: dict[str, Callable[[str, CompetitorScores], bool]] = {
-    "best of all": lambda id, row: True,
-    "best without learning": lambda id, row: not is_learned(id),
-    f"best calm one, at most {CALM:g} N/s": lambda id, row: (
+    BEST: lambda id, row: True,
+    UNLEARNED: lambda id, row: not is_learned(id),
+    f"best with at most {CALM:g} N/s": lambda id, row: (
         row.metrics["thrust_variation"].mean <= CALM and not row.failures
     ),
-    "best without foreseeing the joints": lambda id, row: FORESIGHT not in row.told,
-    "the paper's law at its best": lambda id, row: is_papers(id),
-    "the paper's law as printed": lambda id, row: id == LAW,
+    "best without the joint references": lambda id, row: FORESIGHT not in row.told,
+    "the paper's law, best gains": lambda id, row: is_papers(id),
+    "the paper's law and gains": lambda id, row: id == LAW,
 }
 
 
@@ -44,7 +52,7 @@ def choices(rows: Mapping[str, CompetitorScores]) -> dict[str, list[str]]:
                 break
     for id, row in rows.items():
         if not row.competitor and id.partition("-")[0] == INFORMED:
-            found[id] = [LIMIT]
+            found[id] = [TOLD_ALL]
     return {id: found[id] for id in rows if id in found}
 
 

@@ -193,16 +193,16 @@ def test_a_verdict_names_the_best_of_each_kind_and_what_could_be_reached() -> No
     rows = made_up_rows({"informed": 35.0, **thrust})
     found = choices(rows)
     assert list(found) == [*thrust, "informed"]
-    assert found["lqg-joints"] == ["best of all", "best without learning"]
-    assert found["indi"] == ["best without foreseeing the joints"]
-    assert found["sta-lag-tuned"] == ["the paper's law at its best"]
-    assert found["pid"] == ["best calm one, at most 20 N/s"]
-    assert found["sta"] == ["the paper's law as printed"]
+    assert found["lqg-joints"] == ["best overall", "best without learning"]
+    assert found["indi"] == ["best without the joint references"]
+    assert found["sta-lag-tuned"] == ["the paper's law, best gains"]
+    assert found["pid"] == ["best with at most 20 N/s"]
+    assert found["sta"] == ["the paper's law and gains"]
     # Nobody is ahead of these in error and in thrust variation.
     assert front(rows) == ["pid", "lqg-joints"]
     lines = leaderboard_page.verdict_table(rows, {"pid": 12.3}).splitlines()[2:]
     cells = lines[3].split(" | ")
-    assert cells[1:3] == ["`pid`", "best calm one, at most 20 N/s"]
+    assert cells[1:3] == ["`pid`", "best with at most 20 N/s"]
     assert cells[3:] == [f"{5.0 * len(rows['pid'].axes):.1f} ± 0.0", "20.0", "12.3 |"]
 
 
