@@ -15,6 +15,9 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "build" / "docs"
 # What of `docs` is part of the site.
 KINDS = (".md", ".svg", ".gif", ".css", ".js")
+# Pages whose tables need the whole width, and what gives it to them.
+WIDE = ("results/leaderboard.md", "results/study/study.md")
+WHOLE = "---\nhide: [navigation, toc]\n---\n\n"
 
 
 def prepare(folder, names=()):
@@ -52,7 +55,9 @@ def content(name, path):
         text, pictures = notebook_page.parts(path, path.relative_to(ROOT).as_posix())
         beside = {f"{Path(name).parent.as_posix()}/{each}": data for each, data in pictures.items()}
         return {name: filled(text)} | beside
-    return {name: filled(path.read_text("utf-8")) if path.suffix == ".md" else path.read_bytes()}
+    if path.suffix != ".md":
+        return {name: path.read_bytes()}
+    return {name: filled((WHOLE if name in WIDE else "") + path.read_text("utf-8"))}
 
 
 def filled(text):

@@ -28,6 +28,7 @@ from usm_baselines.benchmark.results import (
     shifts_in,
 )
 from usm_baselines.benchmark.verdict import BEST, TIERS, UNLEARNED, choices
+from usm_baselines.registry import POSITION_ONLY
 from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.support.text import degrees, figures, give_or_take, listed, mm
 from usm_gym.support.validation import require
@@ -46,14 +47,13 @@ MARK = "†"
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes, with half of its 95 % interval;
-worst episode. Largest heading error, °. Variation is how much the thrust changes in a second.
-"Told" is what a policy knows besides the measured position and the reference. Rows are ordered by
-the objective by which gains and agents are chosen: the means in {axes} added up, plus {attitude} mm
-per degree of heading error and {variation} mm per N/s of thrust variation. Going down, rows share a
-rank (=) until the data tell one from the first of them. "Beats the next" says whether the interval
-of the paired difference to the next row leaves out 0, and with what probability an episode goes
-better. "Over informed" is a row's means over those of the law that is told what is constant in an
-episode: the distance that knowledge could close.
+worst episode. Largest heading error, °. Variation is how much the command of a thruster changes in
+a second. Rows are ordered by the objective by which gains and agents are chosen: the means in
+{axes} added up, plus {attitude} mm per degree of heading error and {variation} mm per N/s of thrust
+variation. Going down, rows share a rank (=) until the data tell one from the first of them. "Beats
+the next" says whether the interval of the paired difference to the next row leaves out 0, and with
+what probability an episode goes better. "Over informed" is a row's means over those of the law that
+is told what is constant in an episode: the distance that knowledge could close.
 
 `leaderboard.csv` has every metric with its interval. `usm report` makes a page of the file
 `leaderboard.json`, whose tables sort and compare each row with a rival of your choice.
@@ -63,6 +63,7 @@ Where robots are lost, and in scans, a table also has the median of the largest 
 share of lost robots; a lost one counts as half a metre or more in the mean.
 """
 SHIFT_LEGEND = "Largest error from a shift of the joint references to the next, mm, mean, {axes}.\n"
+TOLD_LEGEND = "Besides the measured position and the reference, which all policies know:\n"
 CROSS_LEGEND = """\
 Gains tuned for one tier of conditions, scored in all: largest error after settling, mm, mean,
 {axes}.
@@ -78,8 +79,7 @@ def table(rows: Mapping[str, Standing]) -> str:
     columns += [f"{angle}, °" for angle in attitude_in(rows.values())]
     columns += ["variation, N/s", "lost"]
     columns += [*(["over informed"] if ratios else []), "beats the next"]
-    lines = [f"| rank | policy | {' | '.join(columns)} | told |"]
-    lines.append(f"|---:|---|{'---:|' * len(columns)}---|")
+    lines = [f"| rank | policy | {' | '.join(columns)} |", f"|---:|---|{'---:|' * len(columns)}"]
     for id, row in rows.items():
         mean, margin = row.combined
         errors, lead = row.errors.values(), row.beats_next
@@ -90,7 +90,7 @@ def table(rows: Mapping[str, Standing]) -> str:
         cells += [figures(row.metrics["thrust_variation"].mean), lost(row, bool(medians))]
         cells += [ratios[id]] if ratios else []
         cells.append("" if lead is None else f"{in_short(lead)} ({lead.probability:.2f})")
-        lines.append(_line(places[id], id, row, [*cells, row.told]))
+        lines.append(_line(places[id], id, row, cells))
     return "\n".join([*lines, *_notes(rows)]) + "\n"
 
 
@@ -195,7 +195,18 @@ def markdown(result: LeaderboardResult) -> str:
             parts.append(f"{id} is refused: {reason}\n")
     if table_of_tiers := cross_table(result):
         parts += ["## Gains across tiers\n", CROSS_LEGEND.format(axes=axes), table_of_tiers]
+    parts += ["## What the policies are told\n", TOLD_LEGEND, knowledge(result)]
     return "\n".join(parts)
+
+
+def knowledge(result: LeaderboardResult) -> str:
+    """What the policies are told, and which are told the same, as Markdown."""
+    told = {id: row.told for rows in result.suites.values() for id, row in rows.items()}
+    lines = []
+    for known in dict.fromkeys(told.values()):
+        alike = ", ".join(id for id, its in sorted(told.items()) if its == known)
+        lines.append(f"- {'nothing' if known == POSITION_ONLY else known}: {alike}\n")
+    return "".join(lines)
 
 
 def verdict(result: LeaderboardResult, figure: str, decisions: Mapping[str, float]) -> str:
