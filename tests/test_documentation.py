@@ -4,6 +4,7 @@ import re
 import runpy
 import shlex
 import shutil
+import sys
 import tomllib
 from dataclasses import replace
 from functools import partial
@@ -161,7 +162,9 @@ def site(tmp_path_factory):
     short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(usm_gym, "suite", lambda name: short)
-        runpy.run_path(str(ROOT / "docs" / "prepare"))["prepare"](pages)
+        prepare = runpy.run_path(str(ROOT / "docs" / "prepare"))["prepare"]
+        patch.setattr(sys.modules["published"], "report", lambda: b"<!doctype html>")
+        prepare(pages)
     config = pytest.importorskip("mkdocs.config").load_config(
         str(ROOT / "mkdocs.yml"), strict=True, docs_dir=str(pages), site_dir=str(made)
     )
