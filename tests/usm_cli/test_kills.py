@@ -15,7 +15,7 @@ KILLS = Path(__file__).parents[1] / "support" / "kills.py"
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
-    [["--every", "train"], ["--kills", "2", "leaderboard", "study"]],
+    [["--every", "train"], ["--kills", "1", "leaderboard", "study"]],
     ids=["at every write", "at random"],
 )
 def test_a_killed_command_ends_as_if_it_had_not_been(arguments):
