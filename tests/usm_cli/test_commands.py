@@ -8,12 +8,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from pkgutil import iter_modules
 
 import pytest
 from support.interrupts import listening
 
-from usm_cli import commands
 from usm_cli.commands import policies
 from usm_cli.program import BUG, main
 from usm_gym.simulation import Simulation
@@ -71,22 +69,6 @@ def test_without_a_command_usm_says_what_it_is_for(capsys):
     said = capsys.readouterr().out
     assert "usm evaluate" in said
     assert "usm COMMAND --help" in said
-
-
-@pytest.mark.parametrize("command", [[USM], [USM, "evaluate"], [sys.executable, "-m", "usm_cli"]])
-def test_help_teaches(command):
-    answer = subprocess.run([*command, "--help"], capture_output=True, text=True, check=False)
-    assert answer.returncode == 0
-    assert "usage: usm" in answer.stdout
-
-
-@pytest.mark.parametrize("columns", [80, 140])
-@pytest.mark.parametrize("command", [module.name for module in iter_modules(commands.__path__)])
-def test_help_fits_the_terminal(command, columns, monkeypatch, capsys):
-    monkeypatch.setenv("COLUMNS", str(columns))
-    main([command, "--help"])
-    said = capsys.readouterr().out.splitlines()
-    assert 0.7 * columns < max(map(len, said)) <= columns
 
 
 def test_evaluate_prints_a_table_and_writes_the_documented_file(tmp_path):

@@ -85,7 +85,7 @@ _CHANGES: dict[str, dict[str, Any]] = {
 }
 ABLATIONS = {name: replace(AGENTS[ABLATED], **changes) for name, changes in _CHANGES.items()}
 PLANS = AGENTS | ABLATIONS
-# Trained with ten seeds, because headlines rest on them; fewer have these, and all others five.
+# Trained with ten seeds, because headlines rest on them. All others have five, or `FEWER`.
 HEADLINES = (
     "residual-ppo",
     "estimator-lqg-joints",
