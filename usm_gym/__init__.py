@@ -8,6 +8,8 @@ from usm_gym.linear_model import LinearModel, linearise
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
+from usm_gym.spatial_dynamics import spatial_accelerations
+from usm_gym.spatial_robot import Link, SpatialRobot, SpatialThruster
 from usm_gym.statistics import compare
 from usm_gym.suites import suite
 from usm_gym.task.conditions import Conditions
@@ -21,10 +23,13 @@ __all__ = [
     "Evaluation",
     "Inspection",
     "LinearModel",
+    "Link",
     "Path",
     "PlanarWorld",
     "Robot",
     "Scenario",
+    "SpatialRobot",
+    "SpatialThruster",
     "Thruster",
     "Vehicle",
     "Water",
@@ -34,6 +39,7 @@ __all__ = [
     "evaluate",
     "linearise",
     "max_error",
+    "spatial_accelerations",
     "suite",
 ]
 __version__ = version("usm-gym")

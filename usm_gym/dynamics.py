@@ -7,6 +7,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from usm_gym.kernels.lanes import padded
 from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout
 from usm_gym.plant.chain import Plant, accelerate_all
@@ -63,14 +64,14 @@ def accelerations(
     require(hydrodynamics in HYDRODYNAMICS, "hydrodynamics", hydrodynamics, allowed)
     require(drag in DRAG, "drag", drag, " or ".join(map(repr, DRAG)))
     given = {
-        "theta": _vectors("theta", theta, n),
-        "theta_dot": _vectors("theta_dot", theta_dot, n),
-        "p_dot": _vectors("p_dot", p_dot, 2),
-        "joint_torques": _vectors("joint_torques", joint_torques, n - 1),
-        "thruster_forces": _vectors("thruster_forces", thruster_forces, len(robot.thrusters)),
-        "current": _vectors("current", current, 2),
+        "theta": vectors("theta", theta, n),
+        "theta_dot": vectors("theta_dot", theta_dot, n),
+        "p_dot": vectors("p_dot", p_dot, 2),
+        "joint_torques": vectors("joint_torques", joint_torques, n - 1),
+        "thruster_forces": vectors("thruster_forces", thruster_forces, len(robot.thrusters)),
+        "current": vectors("current", current, 2),
     }
-    batch, states = _broadcast(given)
+    batch, states = broadcast(given)
     plant = plant_of(robot, 0.0, hydrodynamics=hydrodynamics, drag=drag)
     size = len(states[0])
     theta_ddot, p_ddot = np.empty((size, n)), np.empty((size, 2))
@@ -96,7 +97,7 @@ def _blocks(
 ) -> Array:
     n, size = robot.links, len(theta)
     blocks = np.tile(body_row(robot, plant), (size, 1))
-    quantities = (size, layout.QUANTITIES, layout.padded(n))
+    quantities = (size, layout.QUANTITIES, padded(n))
     of_links = blocks[:, layout.HEADER : layout.row_of(layout.QUANTITIES, n)]
     links = of_links.reshape(quantities)[:, :, :n]
     links[:, layout.THETA] = theta
@@ -110,7 +111,12 @@ def _blocks(
     return blocks
 
 
-def _vectors(name: str, value: Any, size: int) -> Array:
+def vectors(name: str, value: Any, size: int) -> Array:
+    """An argument of vectors, (..., size).
+
+    Raises:
+        ValueError: If it has another shape, or a value is not finite.
+    """
     array = real_array(name, value)
     allowed = f"an array of shape ({size},) or (..., {size})"
     require(array.ndim >= 1 and array.shape[-1] == size, name, value, allowed)
@@ -118,7 +124,7 @@ def _vectors(name: str, value: Any, size: int) -> Array:
     return np.asarray(array, np.float64)
 
 
-def _broadcast(given: dict[str, Array]) -> tuple[tuple[int, ...], list[Array]]:
+def broadcast(given: dict[str, Array]) -> tuple[tuple[int, ...], list[Array]]:
     """The shape of the batch, and the arguments for all of it, (size, ...)."""
     shapes = {name: array.shape[:-1] for name, array in given.items()}
     if not any(shapes.values()):

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Plant
-from usm_gym.plant.joints import filter_coefficients
+from usm_gym.plant.references import NEVER, filter_coefficients
 from usm_gym.plant.thrusters import lag_shares
 from usm_gym.robot import Drag, Hydrodynamics, Robot
 
@@ -87,7 +87,7 @@ def body_row(
     side = rows.row_of(rows.SIDE, links)
     row[side : side + links] = rows.sides(links)
     row[rows.FILTER_DD : rows.FILTER_DAMPING + 1] = filter_coefficients(filter_frequency, plant.h)
-    row[rows.SHIFT_STEP : rows.SHIFT_SIZE] = rows.NEVER
+    row[rows.SHIFT_STEP : rows.SHIFT_SIZE] = NEVER
     factor = rows.row_of(rows.FACTOR, links)
     row[factor : factor + links] = link_factors
     row[rows.LAG], row[rows.MEAN_LAG] = lag_shares(time_constant, plant.h)

@@ -75,11 +75,11 @@ def observe(fleet, plant, table, robot, lanes):
 @piece
 def run(fleet, plant, table, actions, like, lanes, stride, first, last):
     """One control period of blocks `first` to `last`: command, advance, measure."""
-    size = actions.shape[0]
+    size, thrusters = actions.shape[0], rows.thruster_rows(plant.links, actions.shape[1])
     for k in range(first, last):
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
             fleet.effort[robot] = command(
-                fleet.blocks[k], lanes, robot - k * lanes, plant.links, actions[robot]
+                fleet.blocks[k], lanes, robot - k * lanes, thrusters, actions[robot]
             )
         advance(block_at(fleet.blocks, k, like), like, spread(0.0), stride, plant)
         for robot in range(k * lanes, min((k + 1) * lanes, size)):

@@ -8,6 +8,7 @@ from scipy.linalg import expm
 from support import oracle
 
 from usm_gym import Conditions, Robot, Scenario
+from usm_gym.kernels.lanes import padded
 from usm_gym.plant import layout
 from usm_gym.simulation import Simulation
 
@@ -269,7 +270,7 @@ class _Rows:
         self.row = blocks[index // lanes, :, index % lanes]
 
     def links(self, quantity: int) -> Array:
-        first = layout.HEADER + quantity * layout.padded(self.robot.links)
+        first = layout.HEADER + quantity * padded(self.robot.links)
         return self.row[first : first + self.robot.links]
 
     def forces(self) -> Array:

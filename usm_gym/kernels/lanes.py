@@ -1,20 +1,25 @@
 """Numbers for several robots side by side: what turns a scalar kernel into a vector one.
 
 Inside kernels a quantity of the plant is either a float64, for one robot, or a `Lanes`, one number
-for each of `WIDTH` robots, held in vector registers. Arithmetic, `abs`, comparisons and `where`
-work alike on both, lane by lane, so that each equation is written once, as for one robot, and
-numba compiles it for either type. Every operation is the IEEE 754 one, and so are its bits.
+for each of `WIDTH` robots, held in vector registers. Arithmetic, `abs`, `math.sqrt`, comparisons
+and `where` work alike on both, lane by lane, so that each equation is written once, as for one
+robot, and numba compiles it for either type. Every operation is the IEEE 754 one, and so are its
+bits.
 """
 
 from __future__ import annotations
 
+import math
 import operator
 from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+
+from usm_gym.kernels.compile import shared
 
 WIDTH = 8
 
@@ -136,6 +141,11 @@ def _size(value):
     return (lambda value: _without_sign(value)) if value == LANES else None
 
 
+@overload(math.sqrt)
+def _root(value):
+    return (lambda value: _square_root(value)) if value == LANES else None
+
+
 @intrinsic
 def _negate(typing_context, value):
     def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -150,6 +160,16 @@ def _without_sign(typing_context, value):
         mask = ir.Constant(INTEGERS, [2**63 - 1] * WIDTH)
         bits = builder.and_(builder.bitcast(args[0], INTEGERS), mask)
         return builder.bitcast(bits, VECTOR)
+
+    return LANES(LANES), emit
+
+
+@intrinsic
+def _square_root(typing_context, value):
+    def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.FunctionType(VECTOR, [VECTOR])
+        root = cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{WIDTH}f64")
+        return builder.call(root, [args[0]])
 
     return LANES(LANES), emit
 
@@ -223,6 +243,12 @@ def _address(builder: Any, width: int, block: Any, row: Any, kind: Any) -> Any:
 
 def _width(kind: Any) -> int:
     return WIDTH if kind == LANES else 1
+
+
+@shared
+def padded(numbers: int) -> int:
+    """Rows of a quantity that is worked on in whole `Lanes`."""
+    return (numbers + WIDTH - 1) // WIDTH * WIDTH
 
 
 def where(mask: Any, yes: Any, no: Any) -> Any:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.elementary import sincos
-from usm_gym.kernels.lanes import WIDTH, block_at, load, spread, store
+from usm_gym.kernels.lanes import WIDTH, block_at, load, padded, spread, store
 from usm_gym.plant.layout import *
 
 

@@ -15,19 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import shared
-from usm_gym.kernels.lanes import WIDTH
+from usm_gym.kernels.lanes import padded
+from usm_gym.plant.references import MAX_SHIFTS, ReferenceRows
+from usm_gym.plant.thrusters import ThrusterRows
+from usm_gym.plant.water import MAX_SINUSOIDS, WaterRows, sinusoid_rows
 
 # Physics steps since the start, as a float. Position, velocity, acceleration of the centre of mass.
 CLOCK, P_X, P_Y, V_X, V_Y, A_X, A_Y = range(7)
 # True hydrodynamic coefficients common to the links, as in `Robot.hydrodynamic_coefficients`.
 C_T, C_N, MU, LAMBDA_1, LAMBDA_2, LAMBDA_3 = range(7, 13)
 # Velocity and acceleration of the water now, and what they are made of: in each axis a mean and a
-# number of sinusoids, amplitude * sin(frequency * t + phase), a slow current and then the waves.
+# number of sinusoids, a slow current and then the waves.
 WATER_X, WATER_Y, WATER_AX, WATER_AY, MEAN_X, MEAN_Y = range(13, 19)
-MAX_SINUSOIDS = 5
 SINUSOID = 19
-AMPLITUDE_X, AMPLITUDE_Y, PHASE_X, PHASE_Y, FREQUENCY_OF_WATER = range(5)
-SINUSOID_ROWS = 5
+SINUSOID_ROWS = sinusoid_rows(2)
+WATER_ROWS = WaterRows(2, CLOCK, WATER_X, WATER_AX, MEAN_X, SINUSOID)
 # Joint controllers: gains, and the joint-space inertia that their implicit treatment adds.
 _JOINTS = SINUSOID + MAX_SINUSOIDS * SINUSOID_ROWS
 STIFFNESS, DAMPING, JOINT_INERTIA = range(_JOINTS, _JOINTS + 3)
@@ -42,13 +44,11 @@ FILTER_STIFFNESS, FILTER_DAMPING = range(_FILTER + 4, _FILTER + 6)
 # the limit, and the smallest force that they make.
 _THRUSTERS = _FILTER + 6
 LAG, MEAN_LAG, LIMIT, DEAD_BAND = range(_THRUSTERS, _THRUSTERS + 4)
-# When the deflection changes, in physics steps since the start (`NEVER` where it does not), and by
-# how much.
-NEVER = 1e30
-MAX_SHIFTS = 16
+# When the deflection changes, and by how much.
 SHIFT_STEP = _THRUSTERS + 4
 SHIFT_SIZE = SHIFT_STEP + MAX_SHIFTS
 HEADER = SHIFT_SIZE + MAX_SHIFTS
+REFERENCES = ReferenceRows(CLOCK, STIFFNESS, DEFLECTION, FILTER_DD, SHIFT_STEP, SHIFT_SIZE)
 
 # Quantities of the links. State: angle and rate. Fixed in an episode: the share of the deflection
 # that is the reference of the joint to the next link, on which side of the root the link is
@@ -68,12 +68,6 @@ QUANTITIES = OWN + 9
 
 
 @shared
-def padded(links: int) -> int:
-    """Rows that each quantity of the links takes."""
-    return (links + WIDTH - 1) // WIDTH * WIDTH
-
-
-@shared
 def row_of(quantity: int, links: int) -> int:
     """Row of a quantity of the first link."""
     return HEADER + quantity * padded(links)
@@ -88,6 +82,21 @@ THRUSTER_QUANTITIES = 4
 def thruster_row(quantity: int, links: int, thrusters: int) -> int:
     """Row of a quantity of the first thruster."""
     return row_of(QUANTITIES, links) + quantity * thrusters
+
+
+@shared
+def thruster_rows(links: int, thrusters: int) -> ThrusterRows:
+    """Where a block keeps its thrusters."""
+    return ThrusterRows(
+        LAG,
+        MEAN_LAG,
+        LIMIT,
+        DEAD_BAND,
+        thruster_row(COMMAND, links, thrusters),
+        thruster_row(FORCE, links, thrusters),
+        thruster_row(GAIN, links, thrusters),
+        thruster_row(TARGET, links, thrusters),
+    )
 
 
 def sides(links: int) -> NDArray[np.float64]:

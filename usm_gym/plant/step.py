@@ -8,29 +8,13 @@ with a lead of 0 the same lines are Euler's forward method.
 from __future__ import annotations
 
 from usm_gym.kernels.compile import piece
-from usm_gym.kernels.elementary import sincos
 from usm_gym.kernels.lanes import load, store
 from usm_gym.plant.chain import accelerate, kinematics
-from usm_gym.plant.joints import advance_references, joint_torques
+from usm_gym.plant.joints import joint_torques
 from usm_gym.plant.layout import *
-from usm_gym.plant.thrusters import push
-
-
-@piece
-def move_water(block, like, plant):
-    """Velocity and acceleration of the water where forces are taken."""
-    time = load(block, CLOCK, like) * plant.h + plant.lead
-    for axis in range(2):
-        velocity, acceleration = load(block, MEAN_X + axis, like), like
-        for k in range(plant.sinusoids):
-            row = SINUSOID + k * SINUSOID_ROWS
-            frequency = load(block, row + FREQUENCY_OF_WATER, like)
-            amplitude = load(block, row + AMPLITUDE_X + axis, like)
-            s, c = sincos(frequency * time + load(block, row + PHASE_X + axis, like))
-            velocity += amplitude * s
-            acceleration += amplitude * (frequency * c)
-        store(block, WATER_X + axis, velocity)
-        store(block, WATER_AX + axis, acceleration)
+from usm_gym.plant.push import push
+from usm_gym.plant.references import advance_references
+from usm_gym.plant.water import move_water
 
 
 @piece
@@ -54,7 +38,7 @@ def integrate(block, like, wide, stride, links, h, lead):
 def physics_step(block, like, wide, stride, plant, base):
     """One physics step from kinematics that are known; arguments as in `chain.accelerate`."""
     links, h, lead = plant.links, plant.h, plant.lead
-    asked = advance_references(block, like, plant.shifts, h, lead)
+    asked = advance_references(block, like, REFERENCES, plant.shifts, h, lead)
     push(block, like, plant)
     joint_torques(block, like, wide, stride, links, lead, asked)
     accelerate(block, like, wide, stride, links, base, plant)
@@ -66,6 +50,6 @@ def advance(block, like, wide, stride, plant):
     """Advance one block by a control period; `like`, `wide` and `stride` as in `chain`."""
     for _ in range(plant.substeps):
         if plant.sinusoids > 0:
-            move_water(block, like, plant)
+            move_water(block, like, WATER_ROWS, plant.sinusoids, plant.h, plant.lead)
         base = kinematics(block, like, wide, stride, plant)
         physics_step(block, like, wide, stride, plant, base)

@@ -2,10 +2,35 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from usm_gym.kernels.compile import compiled, piece, shared
 from usm_gym.kernels.elementary import exp_of_negative
 from usm_gym.kernels.lanes import load, store
-from usm_gym.plant.layout import *
+
+
+class ThrusterRows(NamedTuple):
+    """Where a block keeps its thrusters: first common numbers, then first rows of quantities.
+
+    Attributes:
+        lag: Share of the way to its target that a force covers in a physics step.
+        mean_lag: Its mean over the step.
+        limit: Largest command, N.
+        dead_band: Smallest force that thrusters make, N.
+        command: Commands, N.
+        force: Forces, N.
+        gain: Forces over commands.
+        target: Forces that the commands lead to, N.
+    """
+
+    lag: int
+    mean_lag: int
+    limit: int
+    dead_band: int
+    command: int
+    force: int
+    gain: int
+    target: int
 
 
 @compiled
@@ -39,82 +64,33 @@ def delivered(command, gain, dead_band):
 
 
 @piece
-def command(row, lanes, lane, links, action):
+def command(row, lanes, lane, rows, action):
     """Set the thruster commands of one robot from its action in [-1, 1]; beyond it saturates.
 
-    `row` is the block of the robot, shape (rows * lanes,), and `lane` its place in it.
+    `row` is the block of the robot, shape (rows * lanes,), `lane` its place in it, and `rows` are
+    `ThrusterRows`.
 
     Returns:
         The mean absolute command, N.
     """
-    limit, dead_band = row[LIMIT * lanes + lane], row[DEAD_BAND * lanes + lane]
-    commands = thruster_row(COMMAND, links, action.size)
-    gains = thruster_row(GAIN, links, action.size)
-    targets = thruster_row(TARGET, links, action.size)
+    limit, dead_band = row[rows.limit * lanes + lane], row[rows.dead_band * lanes + lane]
     effort = 0.0
     for j in range(action.size):
         force = saturated(float(action[j]), 1.0) * limit
-        gain = row[(gains + j) * lanes + lane]
-        row[(commands + j) * lanes + lane] = force
-        row[(targets + j) * lanes + lane] = delivered(force, gain, dead_band)
+        gain = row[(rows.gain + j) * lanes + lane]
+        row[(rows.command + j) * lanes + lane] = force
+        row[(rows.target + j) * lanes + lane] = delivered(force, gain, dead_band)
         effort += abs(force)
     return effort / action.size
 
 
 @piece
-def push(block, like, plant):
-    """First-order lag of every thruster, and its mean force over a physics step on its link."""
-    links, thrusters = plant.links, plant.thruster_links.size
-    along, across = row_of(PUSH_T, links), row_of(PUSH_N, links)
-    for j in range(thrusters):
-        store(block, along + plant.thruster_links[j], like)
-        store(block, across + plant.thruster_links[j], like)
-    lag, mean_lag = load(block, LAG, like), load(block, MEAN_LAG, like)
-    forces = thruster_row(FORCE, links, thrusters)
-    targets = thruster_row(TARGET, links, thrusters)
-    for j in range(thrusters):
-        force = load(block, forces + j, like)
-        way = load(block, targets + j, like) - force
-        store(block, forces + j, force + lag * way)
-        target = plant.thruster_links[j] + (across if plant.thruster_is_normal[j] else along)
-        store(block, target, load(block, target, like) + (force + mean_lag * way))
-
-
-@piece
-def allocation_matrix(sine, cosine, l, thruster_links, thruster_is_normal, T):
-    """Fill in T, shape (3, thrusters): the wrench (N, N, N m) that a unit force of each makes.
-
-    The moment is about the centre of mass. The paper prints its row without the factor l; here
-    it is the true moment (docs/model.md section 6).
-
-    Args:
-        sine: Sines of the link angles, (n,).
-        cosine: Cosines of the link angles, (n,).
-        l: Half the length of a link, m.
-        thruster_links: Zero-based link of each thruster.
-        thruster_is_normal: Whether each thruster pushes across its link.
-        T: Where to write.
-    """
-    n = sine.size
-    share = 1.0 / n
-    x, y, mean_x, mean_y = 0.0, 0.0, 0.0, 0.0
-    for i in range(1, n):
-        x += l * (cosine[i - 1] + cosine[i])
-        y += l * (sine[i - 1] + sine[i])
-        mean_x += x * share
-        mean_y += y * share
-    at, x, y = 0, -mean_x, -mean_y
-    for j in range(thruster_links.size):
-        link = thruster_links[j]
-        if link < at:
-            at, x, y = 0, -mean_x, -mean_y
-        for i in range(at + 1, link + 1):
-            x += l * (cosine[i - 1] + cosine[i])
-            y += l * (sine[i - 1] + sine[i])
-        at = link
-        T[0, j] = -sine[link] if thruster_is_normal[j] else cosine[link]
-        T[1, j] = cosine[link] if thruster_is_normal[j] else sine[link]
-        T[2, j] = x * T[1, j] - y * T[0, j]
+def mean_force(block, like, rows, j):
+    """Move the force of thruster j on by a physics step; returns its mean over the step, N."""
+    force = load(block, rows.force + j, like)
+    way = load(block, rows.target + j, like) - force
+    store(block, rows.force + j, force + load(block, rows.lag, like) * way)
+    return force + load(block, rows.mean_lag, like) * way
 
 
 @piece

@@ -12,7 +12,7 @@ import numpy as np
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.elementary import sincos
 from usm_gym.plant.layout import *
-from usm_gym.plant.thrusters import allocation_matrix
+from usm_gym.plant.push import allocation_matrix
 from usm_gym.sensors import Entry, Layout
 from usm_gym.task.guidance import *
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from usm_gym.plant.layout import MAX_SHIFTS
+from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robot import Robot
 from usm_gym.robots import PAPER, name_of, robot_of
 from usm_gym.support.validation import require

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import Field, Strict, TypeAdapter
 
-from usm_gym.plant.layout import MAX_SHIFTS
+from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robot import Damping, Robot, Stiffness
 from usm_gym.robots import PAPER, robot_of
 from usm_gym.support.validation import Count, Number, Switch, build, require, validated

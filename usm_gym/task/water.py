@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from usm_gym.plant.layout import MAX_SINUSOIDS
+from usm_gym.plant.water import MAX_SINUSOIDS
 from usm_gym.support.validation import Number, validated
 from usm_gym.task.conditions import LARGEST_CURRENT, Coefficient, Conditions
 

@@ -15,8 +15,10 @@ from usm_gym.kernels.compile import compiled, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.plant.chain import directions, kinematics
 from usm_gym.plant.layout import *
-from usm_gym.plant.step import move_water, physics_step
-from usm_gym.plant.thrusters import allocate, allocation_matrix, delivered, saturated
+from usm_gym.plant.push import allocation_matrix
+from usm_gym.plant.step import physics_step
+from usm_gym.plant.thrusters import allocate, delivered, saturated
+from usm_gym.plant.water import move_water
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError
@@ -250,7 +252,7 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
                 record, step // every, t, position, error, force, commands, theta, surface, state
             )
         if plant.sinusoids > 0:
-            move_water(block, 0.0, plant)
+            move_water(block, 0.0, WATER_ROWS, plant.sinusoids, plant.h, plant.lead)
         base = kinematics(block, 0.0, wide, WIDTH, plant)
         physics_step(block, 0.0, wide, WIDTH, plant, base)
         n = step // every

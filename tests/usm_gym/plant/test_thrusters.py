@@ -8,7 +8,7 @@ from support import oracle
 from support.swimming import swimmer
 
 from usm_gym import Robot, Thruster
-from usm_gym.plant import thrusters
+from usm_gym.plant import push, thrusters
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ ROBOTS = [Robot(), REDUNDANT, swimmer(2), swimmer(10)]
 
 @numba.njit
 def fill_in(sine, cosine, l, links, is_normal, T):  # type: ignore[no-untyped-def]
-    thrusters.allocation_matrix(sine, cosine, l, links, is_normal, T)
+    push.allocation_matrix(sine, cosine, l, links, is_normal, T)
 
 
 @numba.njit
