@@ -42,8 +42,7 @@ def links(
     middle = count // 2
     halves = np.outer(robot.lengths / 2, [1.0, 0.0, 0.0])
     rotation, centre, omega, speed = ([np.zeros(3)] * count for _ in range(4))
-    w, vector = quaternion[0], skew(quaternion[1:])
-    rotation[middle] = np.eye(3) + 2.0 * w * vector + 2.0 * vector @ vector
+    rotation[middle] = rotation_of(quaternion)
     centre[middle] = np.asarray(position)
     omega[middle] = rotation[middle] @ angular_velocity
     speed[middle] = velocity
@@ -221,7 +220,7 @@ def energy(
 ) -> float:
     """Return the energy of robot and water, J, seen from the water; `velocity` is relative to it.
 
-    It has no potential where the middle link's centre and all others are at height 0.
+    Weight and buoyancy have no potential at height 0.
     """
     body = links(robot, quaternion, angular_velocity, velocity, joint_angles, joint_rates, position)
     V = in_link_axes(body)
@@ -263,6 +262,12 @@ def in_link_axes(body: Links) -> Array:
 def global_axes(robot: SpatialRobot, body: Links) -> Array:
     """Return the axes of the joints in the global frame, (n - 1, 3)."""
     return np.einsum("kij,kj->ki", body.rotation[:-1], np.array(robot.joint_axes))
+
+
+def rotation_of(quaternion: Array) -> Array:
+    """Return the rotation from link axes of a unit quaternion (w, x, y, z), (3, 3)."""
+    vector = skew(quaternion[1:])
+    return np.eye(3) + 2.0 * quaternion[0] * vector + 2.0 * vector @ vector
 
 
 def turned(axis: Array, angle: float) -> Array:

@@ -5,12 +5,26 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from support.spatial_oracle import rotation_of
 
+import usm_gym
 from usm_gym.spatial_robot import EELY, EELY_NEUTRAL, Link, SpatialRobot, SpatialThruster
 
 Array = NDArray[np.float64]
 
-X, Y, Z = np.eye(3).tolist()
+
+class SpatialMotion(NamedTuple):
+    """A run sampled in time, relative to the water, the middle link starting at the origin."""
+
+    time: Array  # (T,) s
+    # What the oracle's energy and impulse take, each (T, ...).
+    quaternion: Array
+    angular_velocity: Array
+    velocity: Array
+    joint_angles: Array
+    joint_rates: Array
+    position: Array
 
 
 class SpatialState(NamedTuple):
@@ -101,9 +115,8 @@ def without_drag(robot: SpatialRobot) -> SpatialRobot:
 def random_state(robot: SpatialRobot, rng: np.random.Generator) -> SpatialState:
     """Draw a state of any attitude and shape, with every input and a current."""
     joints = len(robot.joint_axes)
-    quaternion = rng.normal(size=4)
     return SpatialState(
-        quaternion=quaternion / np.linalg.norm(quaternion),
+        quaternion=unit_quaternion(rng),
         angular_velocity=rng.normal(0.0, 1.0, 3),
         linear_velocity=rng.normal(0.0, 1.0, 3),
         joint_angles=rng.uniform(-1.5, 1.5, joints),
@@ -111,6 +124,29 @@ def random_state(robot: SpatialRobot, rng: np.random.Generator) -> SpatialState:
         joint_torques=rng.normal(0.0, 10.0, joints),
         thruster_forces=rng.normal(0.0, 20.0, len(robot.thrusters)),
         current=rng.normal(0.0, 0.3, 3),
+    )
+
+
+def unit_quaternion(rng: np.random.Generator) -> Array:
+    """Draw an attitude."""
+    quaternion = rng.normal(size=4)
+    return quaternion / np.linalg.norm(quaternion)
+
+
+def rotated(state: SpatialState, turn: Array) -> SpatialState:
+    """Return the state as it is when robot and water are turned by a unit quaternion."""
+    R = rotation_of(turn)
+    return state._replace(
+        quaternion=product(turn, state.quaternion),
+        linear_velocity=R @ state.linear_velocity,
+        current=R @ state.current,
+    )
+
+
+def moved(state: SpatialState, velocity: Array) -> SpatialState:
+    """Return the state seen from a frame in which robot and water have that velocity more."""
+    return state._replace(
+        linear_velocity=state.linear_velocity + velocity, current=state.current + velocity
     )
 
 
@@ -131,3 +167,35 @@ def product(p: Array, q: Array) -> Array:
 def attitude_rate(quaternion: Array, angular_velocity: Array) -> Array:
     """Return the derivative of an attitude, whose angular velocity is in link axes."""
     return product(quaternion, np.concatenate([[0.0], angular_velocity])) / 2
+
+
+def swim(robot: SpatialRobot, state: SpatialState, duration: float) -> SpatialMotion:
+    """Integrate the plant under constant inputs, so closely that only its own errors show."""
+    parts = (*state.motion(), np.zeros(3))
+    ends = np.cumsum([part.size for part in parts])[:-1]
+
+    def derivative(_: float, y: Array) -> Array:
+        quaternion, omega, velocity, angles, rates, _ = np.split(y, ends)
+        quaternion /= np.linalg.norm(quaternion)
+        moving = (quaternion, omega, velocity + state.current, angles, rates)
+        linear, angular, joints = usm_gym.spatial_accelerations(robot, *moving, *state[5:])
+        turning = attitude_rate(quaternion, omega)
+        return np.concatenate([turning, angular, linear, rates, joints, velocity])
+
+    def headroom(_: float, y: Array) -> float:
+        return 1e3 - float(np.max(np.abs(y)))
+
+    headroom.terminal = True  # type: ignore[attr-defined]  # a faulty plant shall fail, not hang
+    time = np.linspace(0.0, duration, 26)
+    solution = solve_ivp(
+        derivative,
+        (0.0, duration),
+        np.concatenate(parts),
+        method="DOP853",
+        t_eval=time,
+        events=headroom,
+        rtol=1e-12,
+        atol=1e-12,
+    )
+    assert solution.status == 0, solution.message
+    return SpatialMotion(time, *np.split(solution.y.T, ends, axis=1))
