@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,17 +41,7 @@ def spatial_plant(
         shifts: Largest number of changes of the joint references in any episode.
         sinusoids: Largest number of sinusoids in the water's velocity in any episode.
     """
-    places, shares = _thruster_entries(robot)
-    return SpatialPlant(
-        links=len(robot.links),
-        root=len(robot.links) // 2,
-        constants=_constants(robot),
-        kinds=np.array([_kind(axis) for axis in robot.joint_axes], np.int64),
-        frames=np.array([_frame(axis).ravel() for axis in robot.joint_axes]),
-        thrusters=len(robot.thrusters),
-        thruster_places=places,
-        thruster_shares=shares,
-        gravity=robot.gravity,
+    return _at_rest(robot)._replace(
         lead=0.0 if euler else 0.5 * step,
         h=step,
         substeps=substeps,
@@ -99,6 +90,28 @@ def spatial_row(
     gain = rows.thruster_row(rows.GAIN, links, thrusters)
     row[gain : gain + thrusters] = thruster_gains
     return row
+
+
+@lru_cache
+def _at_rest(robot: SpatialRobot) -> SpatialPlant:
+    """What all copies of a robot share, whatever the step."""
+    places, shares = _thruster_entries(robot)
+    return SpatialPlant(
+        links=len(robot.links),
+        root=len(robot.links) // 2,
+        constants=_constants(robot),
+        kinds=np.array([_kind(axis) for axis in robot.joint_axes], np.int64),
+        frames=np.array([_frame(axis).ravel() for axis in robot.joint_axes]),
+        thrusters=len(robot.thrusters),
+        thruster_places=places,
+        thruster_shares=shares,
+        gravity=robot.gravity,
+        lead=0.0,
+        h=0.0,
+        substeps=1,
+        shifts=0,
+        sinusoids=0,
+    )
 
 
 def _constants(robot: SpatialRobot) -> Array:

@@ -286,7 +286,7 @@ def drag(block, like, wide, stride, plant, i, omega, v):
 
 @piece
 def later(v, lead, a, b):
-    """v + lead (a - b)."""
+    """Return v + lead (a - b)."""
     return v[0] + lead * (a[0] - b[0]), v[1] + lead * (a[1] - b[1]), v[2] + lead * (a[2] - b[2])
 
 
