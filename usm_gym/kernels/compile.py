@@ -42,6 +42,13 @@ def piece(function: F) -> F:
     return part
 
 
+def aside(function: F) -> F:
+    """Compile a part of kernels that is seldom run: it is called, where a `piece` is inlined."""
+    notice(function)
+    part: F = numba.njit(fastmath=FLAGS, error_model="numpy")(function)
+    return part
+
+
 def shared(function: F) -> F:
     """Let kernels call a plain Python function, which stays one for everybody else."""
     notice(function)

@@ -13,14 +13,12 @@ Rigid Body Dynamics Algorithms, 2008, chapter 7, with two 3-vectors in place of 
 from __future__ import annotations
 
 from usm_gym.kernels.compile import compiled, piece
-from usm_gym.kernels.lanes import WIDTH, block_at, load, padded, spread, store
+from usm_gym.kernels.lanes import WIDTH, block_at, load, spread, store
 from usm_gym.plant.spatial.joint_axes import (
-    from_joint,
-    matrix_from_joint,
-    matrix_to_joint,
-    symmetric_from_joint,
-    symmetric_to_joint,
-    to_joint,
+    answer_from_joint,
+    answer_to_joint,
+    pair_from_joint,
+    pair_to_joint,
 )
 from usm_gym.plant.spatial.layout import *
 from usm_gym.plant.spatial.links import (
@@ -38,7 +36,7 @@ from usm_gym.plant.spatial.rotation import about_z, at_distance, cross, out_of, 
 @piece
 def with_own(block, like, i, plant, answer):
     """The sum of an answer and link i's own."""
-    rows, own = padded(plant.links), row_of(OWN, plant.links) + i
+    rows, own = stride_of(plant.links), row_of(OWN, plant.links) + i
     J, H, M, n, f = answer
     s = scalar(plant, FIRST_MOMENT, i)
     q = load(block, own + 3 * rows, like)
@@ -123,7 +121,7 @@ def without_joint(block, like, j, plant, answer):
     (J_zz + k) phi'' = n_z + u - (what the rest of its motion takes): an update of rank one.
     """
     links = plant.links
-    rows, sub = padded(links), row_of(SUB, links) + j
+    rows, sub = stride_of(links), row_of(SUB, links) + j
     k = load(block, JOINT_INERTIA, like)
     u = scalar(plant, SIDE, j) * load(block, row_of(TORQUE, links) + j, like)
     J, H, M, n, f = answer
@@ -187,18 +185,15 @@ def eliminate(block, like, i, j, distance, plant, answer):
     Returns:
         The answer at the neighbour's point, in its axes.
     """
-    J, H, M, n, f = with_own(block, like, i, plant, answer)
-    J, H = symmetric_to_joint(plant, j, J), matrix_to_joint(plant, j, H)
-    M, n, f = symmetric_to_joint(plant, j, M), to_joint(plant, j, n), to_joint(plant, j, f)
-    J, H, M, n, f = without_joint(block, like, j, plant, (J, H, M, n, f))
+    answer = with_own(block, like, i, plant, answer)
+    answer = answer_to_joint(plant, j, answer)
+    J, H, M, n, f = without_joint(block, like, j, plant, answer)
     s = load(block, row_of(SIN, plant.links) + j, like)
     c = load(block, row_of(COS, plant.links) + j, like)
     s_2, c_2 = 2.0 * s * c, 1.0 - 2.0 * s * s
     J, M = turned_symmetric(s, c, s_2, c_2, J), turned_symmetric(s, c, s_2, c_2, M)
     H, n, f = turned_matrix(s, c, s_2, c_2, H), about_z(s, c, n), about_z(s, c, f)
-    J, H = symmetric_from_joint(plant, j, J), matrix_from_joint(plant, j, H)
-    M, n, f = symmetric_from_joint(plant, j, M), from_joint(plant, j, n), from_joint(plant, j, f)
-    return moved(distance, (J, H, M, n, f))
+    return moved(distance, answer_from_joint(plant, j, (J, H, M, n, f)))
 
 
 @piece
@@ -287,12 +282,12 @@ def substitute(block, like, i, j, distance, plant, motion):
         The same of link i.
     """
     links = plant.links
-    rows, sub = padded(links), row_of(SUB, links) + j
+    rows, sub = stride_of(links), row_of(SUB, links) + j
     s = -load(block, row_of(SIN, links) + j, like)
     c = load(block, row_of(COS, links) + j, like)
     alpha, a = motion
-    a = about_z(s, c, to_joint(plant, j, at_distance(distance, alpha, a)))
-    alpha = about_z(s, c, to_joint(plant, j, alpha))
+    alpha, a = pair_to_joint(plant, j, alpha, at_distance(distance, alpha, a))
+    alpha, a = about_z(s, c, alpha), about_z(s, c, a)
     by_alpha = (
         load(block, sub + rows, like),
         load(block, sub + 2 * rows, like),
@@ -305,8 +300,8 @@ def substitute(block, like, i, j, distance, plant, motion):
     )
     beyond = load(block, sub, like) - (dot(by_alpha, alpha) + dot(by_a, a))
     store(block, row_of(PHI_DDOT, links) + j, scalar(plant, SIDE, j) * beyond)
-    alpha = from_joint(plant, j, (alpha[0], alpha[1], alpha[2] + beyond))
-    a = at_distance(-scalar(plant, REACH, i), alpha, from_joint(plant, j, a))
+    alpha, a = pair_from_joint(plant, j, (alpha[0], alpha[1], alpha[2] + beyond), a)
+    a = at_distance(-scalar(plant, REACH, i), alpha, a)
     keep_accelerations(block, like, i, plant, alpha, a)
     return alpha, a
 

@@ -77,9 +77,15 @@ THRUSTER_QUANTITIES = 4
 
 
 @shared
+def stride_of(links: int) -> int:
+    """Rows that each quantity of the links takes: one too many for them to share cache lines."""
+    return padded(links) + 1
+
+
+@shared
 def row_of(quantity: int, links: int) -> int:
     """Row of a quantity of the first link, or of the first joint."""
-    return HEADER + quantity * padded(links)
+    return HEADER + quantity * stride_of(links)
 
 
 @shared

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import piece
 from usm_gym.kernels.elementary import sincos
-from usm_gym.kernels.lanes import block_at, load, padded, spread, store
-from usm_gym.plant.spatial.joint_axes import from_joint, to_joint
+from usm_gym.kernels.lanes import block_at, load, spread, store
+from usm_gym.plant.spatial.joint_axes import vectors_from_joint, vectors_to_joint
 from usm_gym.plant.spatial.layout import *
 from usm_gym.plant.spatial.rotation import (
     about_z,
@@ -88,7 +88,7 @@ def scalar(plant, quantity, i):
 @piece
 def load_vector(block, quantity, i, links, like):
     """Three numbers of link i."""
-    rows, row = padded(links), row_of(quantity, links) + i
+    rows, row = stride_of(links), row_of(quantity, links) + i
     return (
         load(block, row, like),
         load(block, row + rows, like),
@@ -99,7 +99,7 @@ def load_vector(block, quantity, i, links, like):
 @piece
 def store_vector(block, quantity, i, links, u):
     """Three numbers of link i."""
-    rows, row = padded(links), row_of(quantity, links) + i
+    rows, row = stride_of(links), row_of(quantity, links) + i
     store(block, row, u[0])
     store(block, row + rows, u[1])
     store(block, row + 2 * rows, u[2])
@@ -195,9 +195,8 @@ def outward(block, like, j, outer, distance, plant, motion):
     """
     links = plant.links
     omega, v, g, alpha, a = motion
-    v = to_joint(plant, j, at_distance(distance, omega, v))
-    a = to_joint(plant, j, at_distance(distance, alpha, a))
-    omega, alpha = to_joint(plant, j, omega), to_joint(plant, j, alpha)
+    v, a = at_distance(distance, omega, v), at_distance(distance, alpha, a)
+    omega, v, g, alpha, a = vectors_to_joint(plant, j, (omega, v, g, alpha, a))
     s = -load(block, row_of(SIN, links) + j, like)
     c = load(block, row_of(COS, links) + j, like)
     rate = load(block, row_of(RATE, links) + j, like)
@@ -205,9 +204,8 @@ def outward(block, like, j, outer, distance, plant, motion):
     alpha, a = about_z(s, c, alpha), about_z(s, c, a)
     alpha = alpha[0] + rate * omega[1], alpha[1] - rate * omega[0], alpha[2]
     a = a[0] + rate * v[1], a[1] - rate * v[0], a[2]
-    omega = from_joint(plant, j, (omega[0], omega[1], omega[2] + rate))
-    alpha, v, a = from_joint(plant, j, alpha), from_joint(plant, j, v), from_joint(plant, j, a)
-    g = from_joint(plant, j, about_z(s, c, to_joint(plant, j, g)))
+    omega, g = (omega[0], omega[1], omega[2] + rate), about_z(s, c, g)
+    omega, v, g, alpha, a = vectors_from_joint(plant, j, (omega, v, g, alpha, a))
     back = -scalar(plant, REACH, outer)
     moved = (omega, at_distance(back, omega, v), g, alpha, at_distance(back, alpha, a))
     store_motion(block, outer, links, moved)
@@ -262,7 +260,7 @@ def own_answers(block, like, wide, stride, plant):
     M_xx, M_yy, n, f. J_xz and H_yx = -H_xy follow from constants, H_yz = -H_zy, M_zz = M_yy, and
     the rest is 0.
     """
-    rows, own = padded(plant.links), row_of(OWN, plant.links)
+    rows, own = stride_of(plant.links), row_of(OWN, plant.links)
     for i in range(0, plant.links, stride):
         answer = own_answer(block, like, wide, stride, plant, i)
         for k in range(12):
