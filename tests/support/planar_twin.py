@@ -1,8 +1,7 @@
 """A spatial robot that moves in the plane as a planar one does, its joints' axes all upright.
 
-They are the links' z axes or, on a robot that lies on its side, their y axes.
-The planar robot's drag in yaw has no like in space. Pairs of thrusters at the ends of every link
-bring it: a couple each.
+They are the links' z axes or, on a robot that lies on its side, their y axes. The planar robot's
+drag in yaw has no like in space: a pair of thrusters at the ends of each link brings it.
 """
 
 import numpy as np

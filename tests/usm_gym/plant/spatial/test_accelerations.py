@@ -115,8 +115,8 @@ def test_energy_and_impulse_are_conserved_without_drag(name: str) -> None:
     samples = list(zip(*motion[1:], strict=True))
     energy = np.array([oracle.energy(robot, *sample) for sample in samples])
     impulse = np.array([oracle.impulse(robot, *sample) for sample in samples])
-    sinking = (robot.displaced_masses.sum() - robot.total_mass) * robot.gravity
-    impulse[:, 2] -= sinking * motion.time
+    lift = (robot.displaced_masses.sum() - robot.total_mass) * robot.gravity
+    impulse[:, 2] -= lift * motion.time
     # Weight and buoyancy have moments about level axes, unless there is no righting moment.
     kept = slice(6) if name == "eely-neutral" else [0, 1, 2, 5]
     assert drift(energy) < 1e-10
