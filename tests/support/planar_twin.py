@@ -1,13 +1,13 @@
 """A spatial robot that moves in the plane as a planar one does, its joints' axes all upright.
 
-The planar robot's drag in yaw has no like in space. Pairs of thrusters at the ends of every link
-bring it: a couple each.
+They are the links' z axes or, on a robot that lies on its side, their y axes. The planar robot's
+drag in yaw has no like in space: a pair of thrusters at the ends of each link brings it.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from support import oracle
-from support.spatial_swimming import SpatialState
+from support.spatial_swimming import SpatialState, product
 from support.swimming import State
 
 from usm_gym import Robot, Thruster
@@ -16,6 +16,10 @@ from usm_gym.spatial_robot import Link, SpatialRobot, SpatialThruster
 Array = NDArray[np.float64]
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+UPRIGHT = {"z": Z, "y": Y}
+LEFT = {"z": Y, "y": (0.0, 0.0, -1.0)}
+# Attitude of a link along x: rolled by a quarter turn if its y axis is up.
+ROLL = {"z": np.array([1.0, 0.0, 0.0, 0.0]), "y": np.array([1.0, 1.0, 0.0, 0.0]) / np.sqrt(2.0)}
 
 
 def planar_robot(links: int, drag_coefficient: float = 2.0) -> Robot:
@@ -40,22 +44,28 @@ def planar_robot(links: int, drag_coefficient: float = 2.0) -> Robot:
     )
 
 
-def twin(robot: Robot) -> SpatialRobot:
-    """Return the spatial robot; its cross-flow drag is to be taken at the links' centres alone."""
+def twin(robot: Robot, up: str) -> SpatialRobot:
+    """Return the spatial robot; `up` is the links' axis that joints turn about.
+
+    Its cross-flow drag is to be taken at the links' centres alone.
+    """
     L, radius, n = robot.link_length, robot.half_height, robot.links
-    direction = {"axial": X, "normal": Y}
+    direction = {"axial": X, "normal": LEFT[up]}
     given = [
         SpatialThruster(thruster.link, (L / 2, 0.0, 0.0), direction[thruster.direction])
         for thruster in robot.thrusters
     ]
     couples = [
-        SpatialThruster(link, (end, 0.0, 0.0), Y) for end in (0.0, L) for link in range(1, n + 1)
+        SpatialThruster(link, (end, 0.0, 0.0), LEFT[up])
+        for end in (0.0, L)
+        for link in range(1, n + 1)
     ]
-    upright = [SpatialThruster(link, (L / 2, 0.0, 0.0), Z) for link in (1, n)]  # none without them
+    # A spatial robot must have some that push up; here they do not.
+    unused = [SpatialThruster(link, (L / 2, 0.0, 0.0), UPRIGHT[up]) for link in (1, n)]
     return SpatialRobot(
         links=(Link(L, radius, robot.link_mass),) * n,
-        joint_axes=(Z,) * (n - 1),
-        thrusters=(*given, *couples, *upright),
+        joint_axes=(UPRIGHT[up],) * (n - 1),
+        thrusters=(*given, *couples, *unused),
         water_density=robot.water_density,
         added_mass_along=0.0,
         added_mass_across=robot.added_mass_coefficient,
@@ -66,7 +76,7 @@ def twin(robot: Robot) -> SpatialRobot:
     )
 
 
-def twin_state(robot: Robot, state: State, linear_yaw_drag: float) -> SpatialState:
+def twin_state(robot: Robot, state: State, linear_yaw_drag: float, up: str) -> SpatialState:
     """Return the state of the twin, whose joints count the other way."""
     middle = robot.links // 2
     body = oracle.links(robot, state.theta)
@@ -74,9 +84,10 @@ def twin_state(robot: Robot, state: State, linear_yaw_drag: float) -> SpatialSta
     velocity = body.jacobian[middle] @ np.concatenate([rate, state.p_dot])
     couple = -(linear_yaw_drag + robot.quadratic_yaw_drag * np.abs(rate)) * rate
     pair = couple / robot.link_length
+    heading = np.array([np.cos(theta / 2), 0.0, 0.0, np.sin(theta / 2)])
     return SpatialState(
-        quaternion=np.array([np.cos(theta / 2), 0.0, 0.0, np.sin(theta / 2)]),
-        angular_velocity=np.array([0.0, 0.0, rate[middle]]),
+        quaternion=product(heading, ROLL[up]),
+        angular_velocity=rate[middle] * np.array(UPRIGHT[up]),
         linear_velocity=np.array([*velocity, 0.0]),
         joint_angles=np.diff(state.theta),
         joint_rates=np.diff(rate),
@@ -87,12 +98,12 @@ def twin_state(robot: Robot, state: State, linear_yaw_drag: float) -> SpatialSta
 
 
 def twin_accelerations(
-    robot: Robot, state: State, theta_ddot: Array, p_ddot: Array
+    robot: Robot, state: State, theta_ddot: Array, p_ddot: Array, up: str
 ) -> tuple[Array, Array, Array]:
     """Return the planar robot's accelerations as those of the twin."""
     middle = robot.links // 2
     body = oracle.links(robot, state.theta)
     centre = body.jacobian[middle] @ np.concatenate([theta_ddot, p_ddot])
     centre += body.centripetal[middle] @ state.theta_dot**2
-    angular = np.array([0.0, 0.0, theta_ddot[middle]])
+    angular = theta_ddot[middle] * np.array(UPRIGHT[up])
     return np.array([*centre, 0.0]), angular, np.diff(theta_ddot)

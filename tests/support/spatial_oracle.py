@@ -54,10 +54,8 @@ def links(
         turn = turned(axis, side * joint_angles[joint])
         rotation[far] = rotation[near] @ turn
         omega[far] = omega[near] + side * joint_rates[joint] * (rotation[near] @ axis)
-        to_joint, from_joint = (
-            side * rotation[near] @ halves[near],
-            side * rotation[far] @ halves[far],
-        )
+        to_joint = side * rotation[near] @ halves[near]
+        from_joint = side * rotation[far] @ halves[far]
         centre[far] = centre[near] + to_joint + from_joint
         speed[far] = (
             speed[near] + np.cross(omega[near], to_joint) + np.cross(omega[far], from_joint)
@@ -220,7 +218,7 @@ def energy(
 ) -> float:
     """Return the energy of robot and water, J, seen from the water; `velocity` is relative to it.
 
-    Weight and buoyancy have no potential at height 0.
+    At height 0 weight and buoyancy have no potential.
     """
     body = links(robot, quaternion, angular_velocity, velocity, joint_angles, joint_rates, position)
     V = in_link_axes(body)

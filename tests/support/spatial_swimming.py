@@ -127,6 +127,13 @@ def random_state(robot: SpatialRobot, rng: np.random.Generator) -> SpatialState:
     )
 
 
+def at_rest(robot: SpatialRobot) -> SpatialState:
+    """Return the straight and level robot, at rest in still water, without torque and thrust."""
+    state = random_state(robot, np.random.default_rng(0))
+    still = SpatialState(*(np.zeros_like(part) for part in state))
+    return still._replace(quaternion=np.array([1.0, 0.0, 0.0, 0.0]))
+
+
 def unit_quaternion(rng: np.random.Generator) -> Array:
     """Draw an attitude."""
     quaternion = rng.normal(size=4)

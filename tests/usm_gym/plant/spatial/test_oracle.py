@@ -11,6 +11,7 @@ from support import spatial_oracle as oracle
 from support.spatial_swimming import (
     ROBOTS,
     SpatialState,
+    at_rest,
     attitude_rate,
     moved,
     random_state,
@@ -38,32 +39,41 @@ def test_agrees_with_mujoco_without_fluid(robot: SpatialRobot) -> None:
     dry = replace(without_drag(robot), added_mass_along=0.0, added_mass_across=0.0)
     model = mujoco.MjModel.from_xml_string(spatial_mujoco.mjcf(dry))
     rng = np.random.default_rng(0)
-    for _ in range(25):
+    for _ in range(10):
         state = random_state(dry, rng)._replace(current=np.zeros(3))
         expected = spatial_mujoco.accelerations(model, dry, *state[:-1])
         assert relative_difference(oracle.accelerations(dry, *state), expected) < 1e-11
 
 
+@pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize("links", [2, 3, 10, 16])
-def test_a_chain_in_the_plane_moves_as_the_planar_robot(links: int) -> None:
+def test_a_chain_in_the_plane_moves_as_the_planar_robot(links: int, up: str) -> None:
     robot = planar_twin.planar_robot(links)
-    twin = planar_twin.twin(robot)
+    twin = planar_twin.twin(robot, up)
     rng = np.random.default_rng(links)
-    for _ in range(25):
+    for _ in range(10):
         state = random_planar_state(robot, rng)
-        expected = planar_twin.twin_accelerations(
-            robot, state, *usm_gym.accelerations(robot, *state)
-        )
-        turned = planar_twin.twin_state(robot, state, robot.linear_yaw_drag)
+        planar = usm_gym.accelerations(robot, *state)
+        expected = planar_twin.twin_accelerations(robot, state, *planar, up)
+        turned = planar_twin.twin_state(robot, state, robot.linear_yaw_drag, up)
         actual = oracle.accelerations(twin, *turned, gauss_points=1)
         assert relative_difference(actual, expected) < 1e-12
+
+
+def test_a_straight_body_carries_a_fifth_of_its_water_along() -> None:
+    robot, forces = EELY_NEUTRAL, np.array([0.0, 0.0, 0.0, 3.0, 3.0, 0.0, 0.0])
+    state = at_rest(robot)._replace(thruster_forces=forces)
+    linear, *others = oracle.accelerations(robot, *state)
+    expected = [6.0 / (1.2 * robot.total_mass), 0.0, 0.0]
+    np.testing.assert_allclose(linear, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(np.concatenate(others), 0.0, rtol=0.0, atol=1e-12)
 
 
 @every_robot
 def test_knows_no_north_and_without_gravity_no_up(robot: SpatialRobot) -> None:
     rng = np.random.default_rng(0)
     weightless = replace(robot, gravity=0.0)
-    for _ in range(10):
+    for _ in range(3):
         state, heading, turn = random_state(robot, rng), rng.normal(), unit_quaternion(rng)
         about_z = np.array([np.cos(heading), 0.0, 0.0, np.sin(heading)])
         assert rotation_matters(robot, state, about_z) < 1e-13
@@ -82,7 +92,7 @@ def rotation_matters(robot: SpatialRobot, state: SpatialState, turn: Array) -> f
 @every_robot
 def test_only_velocity_relative_to_the_water_matters(robot: SpatialRobot) -> None:
     rng = np.random.default_rng(0)
-    for _ in range(10):
+    for _ in range(5):
         state = random_state(robot, rng)
         actual = oracle.accelerations(robot, *moved(state, rng.normal(size=3)))
         assert relative_difference(actual, oracle.accelerations(robot, *state)) < 1e-13
@@ -112,7 +122,7 @@ def test_energy_changes_by_the_power_of_joints_and_thrusters(
     robot: SpatialRobot, speed: float
 ) -> None:
     ideal, rng = without_drag(robot), np.random.default_rng(0)
-    for _ in range(5):
+    for _ in range(3):
         state = fast_state(ideal, rng, speed)
         powers = [*state.joint_rates * state.joint_torques, *thruster_powers(ideal, state)]
         turnover = oracle.energy(ideal, *state.motion(), np.zeros(3)) * fastest(state)
@@ -125,7 +135,7 @@ def test_energy_changes_by_the_power_of_joints_and_thrusters(
 @pytest.mark.parametrize("speed", [1.0, 20.0])
 def test_impulse_changes_by_thrust_and_weight(robot: SpatialRobot, speed: float) -> None:
     ideal, rng = without_drag(robot), np.random.default_rng(0)
-    for _ in range(5):
+    for _ in range(3):
         state, position = fast_state(ideal, rng, speed), rng.normal(size=3)
         body = oracle.links(ideal, *state.motion(), position)
         wrenches = oracle.thrust(ideal, state.thruster_forces)
@@ -143,7 +153,7 @@ def test_impulse_changes_by_thrust_and_weight(robot: SpatialRobot, speed: float)
 @every_robot
 def test_drag_takes_energy(robot: SpatialRobot) -> None:
     rng = np.random.default_rng(0)
-    for _ in range(10):
+    for _ in range(5):
         state = random_state(robot, rng).coasting()
         assert rate_of_change(oracle.energy, robot, state, np.zeros(3)) < 0.0
 
