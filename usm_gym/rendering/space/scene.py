@@ -80,9 +80,9 @@ class SpatialScene:
         self._floor = float(picture.path[:, 2].min()) - FLOOR * self._length
         self._water()
         self._lines(picture)
+        self._shadow(self._hull.posed(picture.rotations, picture.centres))
         self._path(picture)
         mesh = self._body.posed(picture.rotations, picture.centres)
-        self._shadow(self._hull.posed(picture.rotations, picture.centres))
         paint(self._panel, self._view, mesh, self._jets(picture) + self._stream(picture))
         self._marks(picture)
         words = [*self._axes(), *self._bar(view.metre(picture.reference))]
@@ -168,17 +168,23 @@ class SpatialScene:
         return lambda: arrow(self._panel, start, tip, 1.0, colour)
 
     def _path(self, picture: SpatialPicture) -> None:
-        """Draw the path on the floor, below everything."""
+        """Draw the path on the floor, and how high above it the centre of mass is."""
         fallen = thinned(picture.path, 400).copy()
         fallen[:, 2] = self._floor
-        for part in self._view.see_line(fallen):
-            self._panel.line(part, 1.0, PATH_SHADOW)
+        foot = picture.track[-1].copy()
+        foot[2] = self._floor
+        for line in (fallen, np.stack([picture.track[-1], foot])):
+            for part in self._view.see_line(line):
+                self._panel.line(part, 1.0, PATH_SHADOW)
+        if self._view.depth(foot) > self._view.near:
+            self._panel.disc(self._view.see(foot), 2.5, PATH_SHADOW)
 
     def _marks(self, picture: SpatialPicture) -> None:
         """Draw path, track, centre of mass and its goal, over everything."""
         panel, view = self._panel, self._view
         dots = self._dots(picture.path)
-        dots = dots[view.depth(dots) > view.near]
+        close = np.linalg.norm(dots - picture.reference, axis=1) < REACH * self._length
+        dots = dots[close & (view.depth(dots) > view.near)]
         if len(dots):
             panel.disc(view.see(dots), 1.3, INK)
         for part in view.see_line(thinned(picture.track, 500)):
@@ -188,11 +194,6 @@ class SpatialScene:
             for part in view.see_line(picture.reference + arm * np.outer((-1, 1), axis)):
                 panel.line(part, 1.8, REFERENCE)
         mass = picture.track[-1]
-        foot = np.array([mass[0], mass[1], self._floor])
-        for part in view.see_line(np.stack([mass, foot])):
-            panel.line(part, 1.0, PATH_SHADOW)
-        if view.depth(foot) > view.near:
-            panel.disc(view.see(foot), 2.5, PATH_SHADOW)
         if view.depth(mass) > view.near:
             panel.centre_of_mass(view.see(mass))
 
