@@ -135,7 +135,8 @@ def _thruster(robot: SpatialRobot, thruster: SpatialThruster) -> list[Mesh]:
         return _collars(DUCT, radius, i, at, direction)
     duct = _duct(_drum(HALF_DUCT * radius, DUCT * radius), i, at, direction)
     arm = at * (0.0, 1.0, 1.0)
-    reach, root = float(np.linalg.norm(arm)), 0.8 * radius
+    # From within the body to within the duct.
+    root, reach = 0.8 * radius, float(np.linalg.norm(arm)) - 0.7 * DUCT * radius
     if reach < root:
         return [duct]
     strut = [(root, 0.0), (root, STRUT * radius), (reach, STRUT * radius), (reach, 0.0)]

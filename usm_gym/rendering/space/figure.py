@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.rendering import svg
 from usm_gym.rendering.look import Points
 from usm_gym.rendering.svg import arrow, box, disc, document, group, line, shape, text, turn
 from usm_gym.spatial_posture import centre_of_mass, link_poses
@@ -76,12 +77,12 @@ class Side:
         back = min(radius * (TAIL_END if link == 0 else END), half)
         front = min(radius * (HEAD_END if link == last else END), half)
         turns = np.linspace(0.0, np.pi / 2, 9)
-        rise, along = radius * np.sin(turns), 1 - np.cos(turns)
-        if link != last:
-            rise = np.maximum(rise, 0.0) ** 0.5 * radius**0.5
-        upper = [np.stack([back * along - half, radius * np.sin(turns) ** 0.5], axis=1)]
-        upper.append(np.stack([half - front * along, rise], axis=1)[::-1])
-        flat = np.concatenate([*upper, *(part[::-1] * (1, -1) for part in upper[::-1])])
+        along, blunt = 1 - np.cos(turns), radius * np.sqrt(np.sin(turns))
+        pointed = radius * np.sin(turns) if link == last else blunt
+        tail_end = np.stack([back * along - half, blunt], axis=1)
+        head_end = np.stack([half - front * along, pointed], axis=1)[::-1]
+        upper = np.concatenate([tail_end, head_end])
+        flat = np.concatenate([upper, upper[::-1] * (1, -1)])
         return self.at(centre + flat @ rotation[:, [0, self.up]].T)
 
 
@@ -101,9 +102,7 @@ def spatial_robot_drawing(robot: SpatialRobot) -> str:
         "the root. From behind: centres of mass lie below the axis, centres of buoyancy on it."
     )
     sides = Side(robot, "from above", "y", ABOVE), Side(robot, "from the right", "z", BESIDE)
-    marks = []
-    for side in sides:
-        marks.append(_side(side))
+    marks = [_side(side) for side in sides]
     marks += [_lengths(sides[0]), _root(sides[1]), _ends(sides[1]), _section(robot), _words(robot)]
     return document(SIZE, title, description, marks)
 
@@ -266,7 +265,7 @@ def _root(side: Side) -> str:
         "root",
         line("ink", bracket, 1.4),
         text(f"root: link {root + 1}", middle, (0, 18), anchor="middle"),
-        *_mass_mark(mass, 5.0),
+        *svg.centre_of_mass(mass, 5.0),
     )
 
 
@@ -277,15 +276,6 @@ def _ends(side: Side) -> str:
     marks = [text("tail", tail, (0, radius + 18), "small", "quiet", "middle")]
     marks.append(text("head", head, (4, -radius - 9), "small", "quiet", "middle"))
     return group("ends", *marks)
-
-
-def _mass_mark(at: Points, radius: float) -> list[str]:
-    marks = [disc("ink", at, radius + 1.2), disc("panel", at, radius)]
-    for first in (0.0, np.pi):
-        angles = np.linspace(first, first + np.pi / 2, 9)
-        rim = at + radius * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
-        marks.append(shape("ink", [at, *rim]))
-    return marks
 
 
 def _section(robot: SpatialRobot) -> str:
@@ -305,7 +295,7 @@ def _section(robot: SpatialRobot) -> str:
     marks.append(line("quiet", [SECTION, np.add(SECTION, (0, -radius - 9))], 1.0))
     marks.append(disc("quiet", SECTION, 3.0))
     marks.append(line("quiet", [mass, np.add(SECTION, (0, radius + 9))], 1.0))
-    marks += _mass_mark(mass, 6.0)
+    marks += svg.centre_of_mass(mass)
     words = "centre of mass" + (f", {100 * link.keel:g} cm lower" if link.keel else "")
     marks.append(
         text("centre of buoyancy", SECTION, (0, -radius - 14), "small", "ink", "middle", "card")
@@ -346,25 +336,23 @@ def _from_behind(j: int, at: Points, radius: float, ahead: bool) -> str:
 
 def _words(robot: SpatialRobot) -> str:
     """What the symbols mean."""
-    meanings = {
-        "*x*, *y*, *z*": "ahead, to the left, up",
-        "*φ*_i": "angle of joint *i*, right-handed",
-        "": "about *z* (pan): positive to the left",
-        " ": "about *y* (tilt): positive downwards",
-        "*f*_j": "positive force of thruster *j*",
-        f"{robot.lengths[0]:g}": _sizes(robot),
-    }
-    colours = {"*f*_j": "thrust", f"{robot.lengths[0]:g}": "quiet"}
+    meanings = [
+        ("*x*, *y*, *z*", "ink", "ahead, to the left, up"),
+        ("*φ*_i", "ink", "angle of joint *i*, right-handed"),
+        ("", "ink", "about *z* (pan): positive to the left"),
+        ("", "ink", "about *y* (tilt): positive downwards"),
+        ("*f*_j", "thrust", "positive force of thruster *j*"),
+        (f"{robot.lengths[0]:g}", "quiet", _sizes(robot)),
+        ("", "ink", "thruster across the drawing"),
+    ]
     marks = []
-    for k, (symbol, meaning) in enumerate(meanings.items()):
-        y = FRAME[0][1] + 20.0 + 24.0 * k
-        if symbol.strip():
-            marks.append(text(symbol, (24.0, y), name=colours.get(symbol, "ink")))
+    y = FRAME[0][1] - 4.0
+    for symbol, colour, meaning in meanings:
+        y += 24.0
+        marks += [text(symbol, (24.0, y), name=colour)] if symbol else []
         marks.append(text(meaning, (84.0, y)))
-    y = FRAME[0][1] + 20.0 + 24.0 * len(meanings)
     port = np.array([35.0, y - 5])
     marks += [disc("edge", port, 5.8), disc("panel", port, 3.5)]
-    marks.append(text("thruster across the drawing", (84.0, y)))
     return group("words", *marks)
 
 
