@@ -10,8 +10,10 @@ import usm_baselines
 import usm_gym
 from usm_gym.evaluation import rollout
 from usm_gym.rendering.figure import robot_drawing
+from usm_gym.rendering.space.figure import spatial_robot_drawing
 from usm_gym.rendering.svg import arrow, box, document, group, line, text
 from usm_gym.robot import Robot
+from usm_gym.spatial_robot import EELY
 from usm_gym.task.conditions import FIELD
 
 SIZE = 640, 418
@@ -161,6 +163,7 @@ def _extremes(x: np.ndarray, y: np.ndarray) -> Sequence[tuple[float, float]]:
 
 DRAWINGS = {
     "robot.svg": lambda: robot_drawing(Robot()),
+    "eely.svg": lambda: spatial_robot_drawing(EELY),
     "control_loop.svg": control_loop,
     "joint_motion.svg": joint_motion,
 }

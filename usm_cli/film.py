@@ -13,7 +13,8 @@ import imageio_ffmpeg
 import numpy as np
 
 from usm_cli.take import Take
-from usm_gym.rendering.canvas import Canvas, Frame, error_scale
+from usm_gym.rendering.canvas import Canvas, Frame
+from usm_gym.rendering.chart import error_scale
 from usm_gym.rendering.comparison import Caption, Comparison
 from usm_gym.rendering.window import Window
 from usm_gym.support.files import replacing

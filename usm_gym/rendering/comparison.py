@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import pygame
 
-from usm_gym.rendering.canvas import Frame, error_scale
+from usm_gym.rendering.canvas import Frame
+from usm_gym.rendering.chart import error_scale
 from usm_gym.rendering.look import (
     ALARM,
     CURRENT,

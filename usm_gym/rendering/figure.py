@@ -12,11 +12,11 @@ from usm_gym.rendering.picture import Posture
 from usm_gym.rendering.svg import (
     arrow,
     box,
+    centre_of_mass,
     disc,
     document,
     group,
     line,
-    shape,
     stamp,
     stamped,
     text,
@@ -160,19 +160,11 @@ def _error(scene: Scene) -> str:
         line("error", np.stack([reference, corner, mass]), 1.2, "3 3"),
         arrow("error", reference, mass - 7 * ahead, 2.6),
         disc("reference", reference, 5.0),
-        *_mass_mark(mass),
+        *centre_of_mass(mass),
         text("*p*", mass, (12, 10)),
         text("*p*_{ref}", reference, (0, 20), anchor="middle"),
         text("*e*", (mass + reference) / 2, (-8, -4), name="error", anchor="end"),
     )
-
-
-def _mass_mark(at: Points) -> list[str]:
-    marks = [disc("ink", at, 7.2), disc("panel", at, 6.0)]
-    for first in (0.0, np.pi):
-        rim = [at + 6.0 * _axis(angle) for angle in np.linspace(first, first + np.pi / 2, 9)]
-        marks.append(shape("ink", [at, *rim]))
-    return marks
 
 
 def _current() -> str:

@@ -15,6 +15,7 @@ INK, PAPER = (38, 50, 56), (255, 255, 255)
 # The colours of Okabe and Ito, which colour-blind people can tell apart, and tints of them.
 GREY, FAINT, RULE, WATER = (96, 110, 118), (222, 230, 235), (200, 210, 217), (243, 248, 251)
 ERROR_COLOURS = ((0, 114, 178), (213, 94, 0))
+AXIS_COLOURS = (*ERROR_COLOURS, (0, 158, 115))
 BODY, BODY_EDGE = (203, 215, 224), (84, 104, 120)
 HEAD, HEAD_EDGE = (240, 178, 60), (140, 92, 0)
 TAIL = (150, 168, 182)

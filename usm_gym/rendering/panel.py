@@ -58,6 +58,12 @@ class Panel:
             corners = self._at(points).tolist()
             pygame.draw.lines(self._surface, colour, False, corners, self._thick(width))
 
+    def segments(self, ends: Points, width: float, colour: Colour) -> None:
+        """Draw lines between pairs of points, (k, 2, 2)."""
+        thick = self._thick(width)
+        for start, stop in self._at(ends).tolist():
+            pygame.draw.line(self._surface, colour, start, stop, thick)
+
     def dashes(self, x: float, top: float, bottom: float, colour: Colour) -> None:
         """Draw a vertical line of dashes."""
         for y in np.arange(top, bottom, 6.0):
@@ -73,6 +79,30 @@ class Panel:
         corners = self._at(points).tolist()
         pygame.draw.polygon(self._surface, colour, corners)
         pygame.draw.aalines(self._surface, edge, True, corners)
+
+    def facets(self, polygons: Points, colours: Points) -> None:
+        """Draw polygons without edges, (k, corners, 2), in colours, (k, 3)."""
+        corners = self._at(polygons).tolist()
+        for polygon, colour in zip(corners, colours.tolist(), strict=True):
+            pygame.draw.polygon(self._surface, colour, polygon)
+
+    def veil(self, polygons: Points, colour: Colour, opacity: float) -> None:
+        """Draw polygons, (k, corners, 2), that let the ground through, once where they overlap."""
+        corners = self._at(polygons)
+        low, high = (edge(corners.reshape(-1, 2), axis=0) for edge in (np.min, np.max))
+        area = pygame.Rect(np.floor(low).tolist(), (np.ceil(high - low) + 2).tolist())
+        area = area.clip(self._surface.get_rect())
+        if not area:
+            return
+        layer = pygame.Surface(area.size, pygame.SRCALPHA)
+        for polygon in (corners - area.topleft).tolist():
+            pygame.draw.polygon(layer, (*colour, round(255 * opacity)), polygon)
+        self._surface.blit(layer, area)
+
+    def shades(self, colours: Points) -> None:
+        """Fill the panel with rows of colours, (rows, 3), from the top."""
+        rows = pygame.surfarray.make_surface(np.rint(colours)[np.newaxis].astype(np.uint8))
+        pygame.transform.scale(rows, self._surface.get_size(), self._surface)
 
     def block(self, area: pygame.Rect, colour: Colour) -> None:
         """Fill an upright rectangle."""

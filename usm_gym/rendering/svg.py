@@ -103,6 +103,16 @@ def disc(name: str, at: ArrayLike, radius: float) -> str:
     return f'<circle class="{name}" cx="{x}" cy="{y}" r="{_number(radius)}"/>'
 
 
+def centre_of_mass(at: ArrayLike, radius: float = 6.0) -> list[str]:
+    """The usual symbol of a centre of mass, a disc in quarters."""
+    marks = [disc("ink", at, radius + 1.2), disc("panel", at, radius)]
+    for first in (0.0, np.pi):
+        angles = np.linspace(first, first + np.pi / 2, 9)
+        rim = np.asarray(at) + radius * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
+        marks.append(shape("ink", [np.asarray(at), *rim]))
+    return marks
+
+
 def box(name: str, at: ArrayLike, size: ArrayLike, edge: str, dashes: str = "") -> str:
     """A rectangle with rounded corners, by its upper left corner."""
     (x, y), (width, height) = _place(at), _place(size)

@@ -14,8 +14,8 @@ import pytest
 import usm_baselines
 
 import usm_gym
-from usm_gym.rendering import canvas as rendering
 from usm_gym.rendering.canvas import SCENE, Canvas
+from usm_gym.rendering.chart import error_scale
 from usm_gym.rendering.look import HEAD, JET_CORE, REFERENCE, TAIL, TRAIL
 from usm_gym.rendering.picture import Recorder
 from usm_gym.rendering.scene import OUTLINE
@@ -118,7 +118,7 @@ def test_frames_have_any_width(width):
 
 def test_the_scale_of_the_error_is_round_and_large_enough():
     for largest, scale in ((0.0, 1e-4), (0.0019, 2e-3), (0.002, 5e-3), (0.3, 0.5), (40.0, 5.0)):
-        assert rendering.error_scale(np.array([[0.0, -largest]])) == pytest.approx(scale)
+        assert error_scale(np.array([[0.0, -largest]])) == pytest.approx(scale)
 
 
 def test_rendering_does_not_touch_the_physics():

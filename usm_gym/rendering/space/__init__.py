@@ -1,0 +1,1 @@
+"""Pictures of a spatial robot in perspective; frames need the extra `render`."""
