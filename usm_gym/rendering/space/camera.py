@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 # Over the robot's length: how far off the camera is, how far below the reference it aims, and what
 # is too near to be seen.
 DISTANCE, LOWERED, NEAR = 1.25, 0.035, 0.03
-# The camera stands behind the robot, to its left and above it: its direction from the robot.
-AZIMUTH, ELEVATION = np.radians(116.0), np.radians(17.0)
+# The camera stands behind the robot, to its right and above it: its direction from the robot.
+AZIMUTH, ELEVATION = np.radians(-116.0), np.radians(17.0)
 WIDE = float(np.radians(46.0))
 # Nothing is drawn further from the middle of the view than this many of its widths.
 FAR_OFF = 20.0

@@ -27,9 +27,6 @@ from usm_gym.spatial_robot import EELY, EELY_NEUTRAL, SpatialRobot
 
 Array = NDArray[np.float64]
 
-pytestmark = pytest.mark.skipif(
-    not hasattr(usm_gym, "spatial_accelerations"), reason="the fast spatial plant is not here yet"
-)
 every_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 DURATION = 5.0  # s
 

@@ -199,7 +199,8 @@ def test_the_camera_keeps_its_place_beside_the_reference():
     here, there = (following(picture(reference=np.array(at))) for at in ((0, 0, 0), (3.0, 1, -2)))
     np.testing.assert_allclose(there.position - here.position, (3, 1, -2))
     behind, left, above = here.position
-    assert behind < 0 < left
+    assert behind < 0
+    assert left < 0
     assert above > 0
 
 
