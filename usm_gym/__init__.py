@@ -10,11 +10,14 @@ from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
 from usm_gym.spatial_dynamics import spatial_accelerations
 from usm_gym.spatial_robot import Link, SpatialRobot, SpatialThruster
+from usm_gym.spatial_world import SpatialWorld
 from usm_gym.statistics import compare
 from usm_gym.suites import suite
 from usm_gym.task.conditions import Conditions
 from usm_gym.task.metrics import max_error
 from usm_gym.task.scenario import Inspection, Path, Scenario
+from usm_gym.task.spatial_scenario import Scan, SpatialPath, SpatialScenario
+from usm_gym.task.spatial_water import SpatialWater, SpatialWave
 from usm_gym.task.water import Water, Wave
 from usm_gym.vehicle import Vehicle
 
@@ -27,9 +30,15 @@ __all__ = [
     "Path",
     "PlanarWorld",
     "Robot",
+    "Scan",
     "Scenario",
+    "SpatialPath",
     "SpatialRobot",
+    "SpatialScenario",
     "SpatialThruster",
+    "SpatialWater",
+    "SpatialWave",
+    "SpatialWorld",
     "Thruster",
     "Vehicle",
     "Water",

@@ -195,8 +195,12 @@ def metric_names(world: World, by_shift: bool = False) -> list[str]:
     """
     position = [f"{name}_{axis}" for name in POSITION_METRICS for axis in world.axes]
     shifts = [f"{name}_{axis}" for name in SHIFT_METRICS for axis in world.axes]
-    angles = [f"{angle}_error" for angle in world.attitude]
-    return [*position, *angles, *THRUST_METRICS, *(shifts if by_shift else ())]
+    return [*position, *_angle_metrics(world), *THRUST_METRICS, *(shifts if by_shift else ())]
+
+
+def _angle_metrics(world: World) -> list[str]:
+    """Names of the metrics of angles; those that are only watched do not enter the objective."""
+    return [*(f"{angle}_error" for angle in world.attitude), *world.watched]
 
 
 def scored_by_shift(scenario: Any) -> bool:
@@ -215,8 +219,8 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
         for axis, error in zip(world.axes, errors, strict=True)
     }
     counted = (trajectory.time >= scenario.settle_time) | lost
-    for k, angle in enumerate(world.attitude):
-        found[f"{angle}_error"] = float(np.abs(trajectory.attitude_error[counted, k]).max())
+    largest = np.abs(trajectory.attitude_error[counted]).max(axis=0, initial=0.0).tolist()
+    found |= dict(zip(_angle_metrics(world), largest, strict=True))
     values = (
         metrics.thrust_effort(trajectory.command),
         metrics.thrust_variation(trajectory.command, conditions.control_period),
@@ -365,7 +369,7 @@ def _at_rest(scenario: Any) -> Trajectory:
         scenario=scenario,
         time=_times(scenario, samples),
         error=np.zeros((samples, len(world.axes))),
-        attitude_error=np.zeros((samples, len(world.attitude))),
+        attitude_error=np.zeros((samples, len(world.attitude) + len(world.watched))),
         command=np.zeros((samples, world.thrusters)),
         lost=False,
     )

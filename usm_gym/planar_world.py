@@ -21,6 +21,7 @@ from usm_gym.plant.thrusters import command
 from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task import guidance
+from usm_gym.task.metrics import note_largest
 from usm_gym.task.observation import (
     ENTRY,
     ObservationLayout,
@@ -85,11 +86,7 @@ def run(fleet, plant, table, actions, like, lanes, stride, first, last):
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
             fleet.instant[robot] += 1
             observe(fleet, plant, table, robot, lanes)
-            if fleet.instant[robot] >= fleet.settled[robot]:
-                for axis in range(fleet.error.shape[1]):
-                    size_now = abs(fleet.error[robot, axis])
-                    if size_now > fleet.max_error[robot, axis]:
-                        fleet.max_error[robot, axis] = size_now
+            note_largest(fleet, robot)
 
 
 @compiled

@@ -5,14 +5,26 @@ from __future__ import annotations
 import gymnasium as gym
 
 from usm_gym.task.scenario import MODES
+from usm_gym.task.spatial_scenario import SPATIAL_MODES
 
 
 def register_environments() -> None:
-    """Register `USM-Operation-v0` and `USM-Torpedo-v0`; they truncate episodes themselves."""
+    """Register the environments, which truncate episodes themselves.
+
+    They are `USM-Operation-v0` and `USM-Torpedo-v0`, and in space `USM-Operation3D-v0` and
+    `USM-Torpedo3D-v0`.
+    """
     for mode in MODES:
         gym.register(
             id=f"USM-{mode.capitalize()}-v0",
             entry_point="usm_gym.envs.usm:USMEnv",
             vector_entry_point="usm_gym.envs.usm:USMVectorEnv",
             kwargs={"mode": mode},
+        )
+    for spatial_mode in SPATIAL_MODES:
+        gym.register(
+            id=f"USM-{spatial_mode.removesuffix('3d').capitalize()}3D-v0",
+            entry_point="usm_gym.envs.usm3d:USM3DEnv",
+            vector_entry_point="usm_gym.envs.usm3d:USM3DVectorEnv",
+            kwargs={"mode": spatial_mode},
         )

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from usm_gym.robot import Robot, read_robot
-from usm_gym.spatial_robot import EELY, EELY_NEUTRAL, SpatialRobot, read_spatial_robot
+from usm_gym.spatial_robot import EELY_NEUTRAL, SpatialRobot, read_spatial_robot
 from usm_gym.support.validation import require
 
-PAPER, EELY_NAME = "paper", "eely"
+PAPER, EELY = "paper", "eely"
 AnyRobot = Robot | SpatialRobot
 
 _robots: dict[str, AnyRobot] = {
     PAPER: Robot(),
-    EELY_NAME: EELY,
+    EELY: SpatialRobot(),
     "eely-neutral": EELY_NEUTRAL,
 }
 

@@ -52,7 +52,8 @@ class Simulation:
         scenarios: The robots' scenarios.
         count: Control periods since the start, int64, (size,).
         error: True position errors, m, (size, axes).
-        attitude_error: Attitude errors as known on board, rad, (size, angles).
+        attitude_error: Attitude errors as known on board, rad, (size, angles): those that are
+            controlled, then those that are watched.
         observation: Observations, float32, (size, numbers).
         max_error: Largest true errors so far after settling, m, (size, axes); 0 before.
         effort: Mean absolute thruster commands, N, (size,).
@@ -84,7 +85,8 @@ class Simulation:
         self._rows = _aligned_zeros((blocks, self.world.rows, self._lanes))
         self.count = np.zeros(self.size, np.int64)
         self.error = np.zeros((self.size, axes))
-        self.attitude_error = np.zeros((self.size, len(self.world.attitude)))
+        angles = len(self.world.attitude) + len(self.world.watched)
+        self.attitude_error = np.zeros((self.size, angles))
         self.observation = np.zeros((self.size, self.layout.size), np.float32)
         self.max_error = np.zeros((self.size, axes))
         self.steps = np.zeros(self.size, np.int64)

@@ -101,6 +101,7 @@ def _at_rest(robot: SpatialRobot) -> SpatialPlant:
         root=len(robot.links) // 2,
         constants=_constants(robot),
         kinds=np.array([_kind(axis) for axis in robot.joint_axes], np.int64),
+        axes=np.array(robot.joint_axes),
         frames=np.array([_frame(axis).ravel() for axis in robot.joint_axes]),
         thrusters=len(robot.thrusters),
         thruster_places=places,

@@ -214,6 +214,13 @@ class SpatialRobot:
             self.cross_flow_drag,
         )
 
+    @property
+    def straight_centre(self) -> Array:
+        """Centre of mass of the straight body, from the middle of its middle link, m, (3,)."""
+        places = np.cumsum(self.lengths) - self.lengths / 2
+        along = self.masses @ (places - places[len(self.links) // 2])
+        return np.array([along, 0.0, -(self.masses @ self.keels)]) / self.total_mass
+
     def straight_allocation(self) -> Array:
         """What unit forces of the thrusters make of the straight body.
 
@@ -221,10 +228,10 @@ class SpatialRobot:
             The forces along x, y and z, N, and the moments about y, z and x through the centre of
             mass, N m, (6, thrusters).
         """
+        root = len(self.links) // 2
         bases = np.cumsum(self.lengths) - self.lengths
-        masses = self.masses
-        centre = np.array([masses @ (bases + self.lengths / 2), 0.0, -(masses @ self.keels)])
-        centre /= masses.sum()
+        bases -= bases[root] + self.lengths[root] / 2
+        centre = self.straight_centre
         columns = []
         for thruster in self.thrusters:
             at = np.array(thruster.position) - centre

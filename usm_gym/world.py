@@ -46,7 +46,8 @@ class Fleet(NamedTuple):
         settled: Control period from which on errors count, int64, (size,).
         error: True position errors, m, (size, axes).
         max_error: Their largest absolute values since settling, m, (size, axes).
-        attitude_error: Attitude errors as known on board, rad, (size, angles).
+        attitude_error: Attitude errors as known on board, rad, (size, angles): those that are
+            controlled, then those that are watched.
         effort: Mean absolute thruster commands, N, (size,).
         observation: Observations, float32, (size, numbers).
     """
@@ -153,8 +154,11 @@ class World(ABC):
 
     Attributes:
         axes: Names of the axes of the position error.
-        attitude: Names of the angles of the attitude error; their errors are observed as
-            `ANGLE_error`.
+        attitude: Names of the angles of the attitude error that are controlled and scored; their
+            errors are observed one after the other, as `ANGLE_error`.
+        watched: Names of angles that are reported, but neither controlled nor scored.
+        attitude_lead: How far ahead the controller of the attitude looks, by the rates of its
+            errors, s; 0 where no rate is observed.
         kernels: The compiled entry points.
         lost_error: Further from its reference than this in any axis a robot is lost, m.
     """
@@ -162,6 +166,8 @@ class World(ABC):
     lost_error: ClassVar[float] = LOST_ERROR
     axes: ClassVar[tuple[str, ...]]
     attitude: ClassVar[tuple[str, ...]] = ()
+    watched: ClassVar[tuple[str, ...]] = ()
+    attitude_lead: ClassVar[float] = 0.0
     kernels: ClassVar[Kernels]
 
     @property
@@ -233,7 +239,8 @@ class World(ABC):
             effort: Mean absolute thruster commands after saturation, N, (size,).
             limit: Thruster limits, N, (size,).
         """
-        return reward(error, attitude_error, effort, limit)
+        controlled = attitude_error[:, : len(self.attitude)]
+        return reward(error, controlled, effort, limit)
 
     def reward_of_loss(self, remaining: NDArray[np.int64]) -> Array:
         """Rewards of the steps that lose robots, (lost,).

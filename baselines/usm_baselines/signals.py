@@ -35,6 +35,9 @@ class Model(NamedTuple):
         reference_velocity: The same.
         reference_acceleration: The same.
         attitude_error: The same.
+        attitude_rate: The same of the rates of roll, pitch and yaw; -1 without any.
+        reference_rate: The same of the references of pitch and yaw.
+        attitude_lead: How far ahead the controller of the attitude looks, s.
         thruster_command: The same.
         thruster_limit: The same.
         position_age: The same; -1 if positions have no age.
@@ -53,6 +56,9 @@ class Model(NamedTuple):
     reference_velocity: int
     reference_acceleration: int
     attitude_error: int
+    attitude_rate: int
+    reference_rate: int
+    attitude_lead: float
     thruster_command: int
     thruster_limit: int
     position_age: int
@@ -117,6 +123,9 @@ def model_of(nominal: Nominal, lag: bool = False) -> Model:
         reference_velocity=first["reference_velocity"],
         reference_acceleration=first["reference_acceleration"],
         attitude_error=first[angles[0]] if angles else layout.size,
+        attitude_rate=first.get("angular_velocity", -1),
+        reference_rate=first.get("reference_rates", -1),
+        attitude_lead=world.attitude_lead,
         thruster_command=first["thruster_command"],
         thruster_limit=first["thruster_limit"],
         position_age=first.get("position_age", -1),
@@ -171,7 +180,10 @@ def sense(state, model, signals):
 
 @compiled
 def act(observation, state, model, allocation, force, attitude_gain, action):
-    """Fill in the actions that make the forces (N) and proportional moments on the attitude."""
+    """Fill in the actions that make the forces (N) and the moments that turn the attitude back.
+
+    A moment is proportional to the error of an angle, as it will be a lead ahead.
+    """
     rows = model.axes + model.angles
     forces, wrench, work = np.empty(model.thrusters), np.empty(rows), np.empty((2 * rows + 1, rows))
     for b in range(observation.shape[0]):
@@ -180,6 +192,10 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
             wrench[axis] = force[b, axis]
         for i in range(model.angles):
             angle_error = physical(seen, model, model.attitude_error + i)
+            if model.attitude_lead > 0.0:
+                rate = physical(seen, model, model.attitude_rate + 1 + i)
+                rate -= physical(seen, model, model.reference_rate + i)
+                angle_error += model.attitude_lead * rate
             wrench[model.axes + i] = -attitude_gain * angle_error
         # Of three rows the compiler unrolls the loops.
         if rows == 3:

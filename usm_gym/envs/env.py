@@ -227,5 +227,6 @@ def infos(simulation: Simulation) -> dict[str, NDArray[Any]]:
     arrays = (simulation.error, simulation.max_error, simulation.attitude_error)
     values = [array[:, k] for array in arrays for k in range(array.shape[1])]
     values += (simulation.effort, simulation.lost.astype(np.float64))
-    keys = info_keys(simulation.world.axes, simulation.world.attitude)
+    world = simulation.world
+    keys = info_keys(world.axes, world.attitude + world.watched)
     return dict(zip(keys, values, strict=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, TypeAdapter
@@ -15,6 +16,9 @@ from usm_gym.support.validation import Number, Switch, build, require, validated
 LARGEST_CURRENT = 5.0
 # What a control period costs at most, which nothing can interrupt.
 MOST_SUBSTEPS = 10_000
+
+# The longest episode: 1000 s at the paper's step of 1e-5 s.
+MOST_PHYSICS_STEPS = 100_000_000
 
 # Beyond these nothing is worth simulating: control periods, and s.
 LARGEST_DELAY, LARGEST_PERIOD, LARGEST_TIME_CONSTANT = 100, 1000, 100.0
@@ -57,9 +61,10 @@ class Conditions:
             1000; None: nothing measures it.
         velocity_delay: By how many control periods a measured velocity is late, 0 to 100.
         velocity_noise: Standard deviation of the velocity measurement, per axis, 0 to 1 m/s.
-        tail_angle_noise: Standard deviation of the measured angle of the tail, 0 to 1 rad.
+        tail_angle_noise: Standard deviation of the measured angle of the tail, in space of the
+            attitude of the middle link about each axis, 0 to 1 rad.
         joint_angle_noise: The same of the joint angles, 0 to 1 rad.
-        rate_noise: The same of the rates of the tail and of the joints, 0 to 1 rad/s.
+        rate_noise: The same of the rates of these and of the joints, 0 to 1 rad/s.
         current_limit: Largest constant current per axis, 0 to 5 m/s.
         current_variation: Largest amplitude of a slow sinusoidal current on top of it, 0 to 5 m/s.
         wave_limit: Largest speed of the water in waves, on top of the current, 0 to 5 m/s.
@@ -196,8 +201,55 @@ PRESETS: dict[str, Conditions] = {
 }
 
 
-def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
+# The same in space, for a robot of 86 kg. Its thrusters are those of a common small vehicle (40 N,
+# assumed), its head moves more slowly and not as far; compass, inclinometer and gyro of "field" are
+# not exact.
+SPATIAL_FIELD = replace(
+    PRESETS["field"],
+    thruster_time_constant=0.1,
+    thruster_limit=40.0,
+    tail_angle_noise=2e-4,
+    rate_noise=2e-4,
+    deflection_range=(0.4, 1.0),
+    filter_range=(3.0, 5.0),
+)
+SPATIAL_PRESETS: dict[str, Conditions] = {
+    "ideal": replace(
+        PRESETS["ideal"],
+        thruster_limit=200.0,
+        deflection_range=SPATIAL_FIELD.deflection_range,
+        filter_range=SPATIAL_FIELD.filter_range,
+    ),
+    "field": SPATIAL_FIELD,
+    "basin": replace(
+        PRESETS["basin"],
+        thruster_time_constant=0.2,
+        thruster_limit=30.0,
+        thruster_dead_band=0.5,
+        deflection_range=SPATIAL_FIELD.deflection_range,
+        filter_range=(2.5, 4.0),
+        shift_gap_range=(5.0, 8.0),
+    ),
+    "sea": replace(
+        PRESETS["sea"],
+        thruster_time_constant=0.25,
+        thruster_limit=40.0,
+        thruster_dead_band=0.5,
+        deflection_range=SPATIAL_FIELD.deflection_range,
+        filter_range=(2.5, 4.0),
+        shift_gap_range=(5.0, 8.0),
+    ),
+}
+
+
+def conditions_of(
+    value: str | Mapping[str, Any] | Conditions, presets: Mapping[str, Conditions] = PRESETS
+) -> Conditions:
     """Give the conditions of a preset's name, or of fields that differ from the preset "field".
+
+    Args:
+        value: Either, or the conditions themselves.
+        presets: The presets that are meant.
 
     Raises:
         ValueError: If the name or a field is unknown, or a value not allowed.
@@ -205,14 +257,34 @@ def conditions_of(value: str | Mapping[str, Any] | Conditions) -> Conditions:
     if isinstance(value, Conditions):
         return value
     if isinstance(value, str):
-        require(value in PRESETS, "conditions", value, ", ".join(PRESETS))
-        return PRESETS[value]
-    return build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
+        require(value in presets, "conditions", value, ", ".join(presets))
+        return presets[value]
+    given = build(_ADAPTER, "conditions", value, "a preset's name or a dict of fields")
+    return replace(presets["field"], **{name: getattr(given, name) for name in value})
 
 
 def preset_of(conditions: Conditions | None) -> str:
-    """The name of the preset that some conditions are; empty if they are none."""
-    return next((name for name, preset in PRESETS.items() if preset == conditions), "")
+    """The name of the preset that some conditions are, in plane or space; empty if of none."""
+    presets = (*PRESETS.items(), *SPATIAL_PRESETS.items())
+    return next((name for name, preset in presets if preset == conditions), "")
+
+
+def require_whole_steps(duration: float, conditions: Conditions) -> None:
+    """Refuse the duration of an episode of no whole number of control periods, or too many steps.
+
+    Raises:
+        ValueError: If it is such.
+    """
+    steps = duration / conditions.control_period
+    require(
+        round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),
+        "duration",
+        duration,
+        f"a multiple of control_period = {conditions.control_period}",
+    )
+    longest = MOST_PHYSICS_STEPS * conditions.physics_step
+    allowed = f"up to {longest:g} s, {MOST_PHYSICS_STEPS} physics steps"
+    require(duration <= longest, "duration", duration, allowed)
 
 
 _ADAPTER = TypeAdapter(Conditions)

@@ -12,24 +12,34 @@ GUIDANCE_ROWS = 7
 
 
 @piece
-def path(t, speed, sway, frequency, ramp):
-    """The reference (p_x, p_y, v_x, v_y, a_x, a_y) at time t: p = (v s, A sin(w s)), s = s(t).
+def path_time(t, ramp):
+    """Path time s at time t, with its first and second derivative.
 
-    Path time s starts from rest: s = t^2 / (2 ramp) up to t = ramp, then t - ramp / 2.
+    It starts from rest: s = t^2 / (2 ramp) up to t = ramp, then t - ramp / 2.
     """
-    s, s_dot, s_ddot = t - 0.5 * ramp, 1.0, 0.0
     if t < ramp:
-        s, s_dot, s_ddot = 0.5 * t * t / ramp, t / ramp, 1.0 / ramp
+        return 0.5 * t * t / ramp, t / ramp, 1.0 / ramp
+    return t - 0.5 * ramp, 1.0, 0.0
+
+
+@piece
+def to_and_fro(s, s_dot, s_ddot, amplitude, frequency):
+    """Amplitude * sin(frequency * s) at path time s, with its first and second derivative."""
     sine, cosine = sincos(frequency * s)
-    slope = sway * frequency
+    slope = amplitude * frequency
     return (
-        speed * s,
-        sway * sine,
-        speed * s_dot,
+        amplitude * sine,
         slope * cosine * s_dot,
-        speed * s_ddot,
         slope * (cosine * s_ddot - frequency * sine * (s_dot * s_dot)),
     )
+
+
+@piece
+def path(t, speed, sway, frequency, ramp):
+    """The reference (p_x, p_y, v_x, v_y, a_x, a_y) at time t: p = (v s, A sin(w s)), s = s(t)."""
+    s, s_dot, s_ddot = path_time(t, ramp)
+    y, y_dot, y_ddot = to_and_fro(s, s_dot, s_ddot, sway, frequency)
+    return speed * s, y, speed * s_dot, y_dot, speed * s_ddot, y_ddot
 
 
 @compiled

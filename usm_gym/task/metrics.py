@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from usm_gym.kernels.compile import piece
 from usm_gym.support.validation import real_array, require
 
 # Controllers are given this long after a change of the joint references, s, and where one follows
@@ -144,6 +145,16 @@ def objective(scores: Mapping[str, Any], variation_weight: float = VARIATION_WEI
     attitude = sum(np.degrees(scores[angle + ANGLE_ERROR]) for angle in attitude_of(scores))
     variation = scores["thrust_variation"]
     return 1e3 * error + ATTITUDE_WEIGHT * attitude + variation_weight * variation
+
+
+@piece
+def note_largest(fleet, robot):
+    """Note the largest errors of a robot since settling, if they count by now."""
+    if fleet.instant[robot] >= fleet.settled[robot]:
+        for axis in range(fleet.error.shape[1]):
+            size_now = abs(fleet.error[robot, axis])
+            if size_now > fleet.max_error[robot, axis]:
+                fleet.max_error[robot, axis] = size_now
 
 
 def _checked(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from usm_gym.support.validation import require
+from usm_gym.task.conditions import Conditions
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,12 @@ class Nominal:
     joint_angle_noise: float = 0.0
     rate_noise: float = 0.0
     thruster_dead_band: float = 0.0
+
+
+def nominal_under(robot: Any, conditions: Conditions) -> Nominal:
+    """What a controller may know of a robot, nominal as given, under some conditions."""
+    names = [field.name for field in fields(Nominal) if field.name != "robot"]
+    return Nominal(robot, **{name: getattr(conditions, name) for name in names})
 
 
 def shared_nominal(scenarios: Iterable[Any]) -> Nominal:

@@ -7,7 +7,6 @@ same in JSON (`to_dict`, `from_dict`).
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args
 
@@ -18,17 +17,20 @@ from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robot import Damping, Robot, Stiffness
 from usm_gym.robots import PAPER, robot_of
 from usm_gym.support.validation import Count, Number, Switch, build, require, validated
-from usm_gym.task.conditions import FIELD, Coefficient, Conditions, FilterFrequency
+from usm_gym.task.conditions import (
+    FIELD,
+    Coefficient,
+    Conditions,
+    FilterFrequency,
+    require_whole_steps,
+)
 from usm_gym.task.guidance import path_positions
-from usm_gym.task.nominal import Nominal
+from usm_gym.task.nominal import Nominal, nominal_under
 from usm_gym.task.sensing import Sensing, sensing
 from usm_gym.task.water import Water, draw_water
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
-# The longest episode: 1000 s at the paper's step of 1e-5 s.
-MOST_PHYSICS_STEPS = 100_000_000
-
 Time = Annotated[Number, Field(ge=0, le=3600)]
 
 
@@ -133,20 +135,7 @@ class Scenario:
             # Another process need not know a name that was given here.
             body = robot_of(self.robot)
             object.__setattr__(self, "robot", PAPER if body == robot_of(PAPER) else body)
-        steps = self.duration / self.conditions.control_period
-        require(
-            round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9),
-            "duration",
-            self.duration,
-            f"a multiple of control_period = {self.conditions.control_period}",
-        )
-        longest = MOST_PHYSICS_STEPS * self.conditions.physics_step
-        require(
-            self.duration <= longest,
-            "duration",
-            self.duration,
-            f"up to {longest:g} s, {MOST_PHYSICS_STEPS} physics steps",
-        )
+        require_whole_steps(self.duration, self.conditions)
 
     @property
     def steps(self) -> int:
@@ -174,22 +163,7 @@ class Scenario:
         stiffness, damping = self.joint_gains
         if (stiffness, damping) != (body.joint_stiffness, body.joint_damping):
             body = dataclasses.replace(body, joint_stiffness=stiffness, joint_damping=damping)
-        return Nominal(
-            robot=body,
-            control_period=conditions.control_period,
-            thruster_time_constant=conditions.thruster_time_constant,
-            position_noise=conditions.position_noise,
-            position_delay=conditions.position_delay,
-            action_delay=conditions.action_delay,
-            position_period=conditions.position_period,
-            velocity_period=conditions.velocity_period,
-            velocity_delay=conditions.velocity_delay,
-            velocity_noise=conditions.velocity_noise,
-            tail_angle_noise=conditions.tail_angle_noise,
-            joint_angle_noise=conditions.joint_angle_noise,
-            rate_noise=conditions.rate_noise,
-            thruster_dead_band=conditions.thruster_dead_band,
-        )
+        return nominal_under(body, conditions)
 
     @property
     def shifts(self) -> tuple[float, ...]:

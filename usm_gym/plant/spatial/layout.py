@@ -22,7 +22,8 @@ ADDED_ALONG, ADDED_ACROSS, LINEAR, SURGE, ROLL, CROSS_FLOW = range(20, 26)
 WATER, WATER_A, MEAN, SINUSOID = 26, 29, 32, 35
 WATER_ROWS = WaterRows(AXES, CLOCK, WATER, WATER_A, MEAN, SINUSOID)
 # Joint controllers: gains, and the joint-space inertia that their implicit treatment adds.
-_JOINTS = SINUSOID + MAX_SINUSOIDS * sinusoid_rows(AXES)
+SINUSOID_ROWS = sinusoid_rows(AXES)
+_JOINTS = SINUSOID + MAX_SINUSOIDS * SINUSOID_ROWS
 STIFFNESS, DAMPING, JOINT_INERTIA = range(_JOINTS, _JOINTS + 3)
 # Joint references: the two deflections that joints have shares of, to the side and up, each with
 # its rate and acceleration; the filter of both.

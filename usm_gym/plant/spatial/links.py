@@ -43,6 +43,7 @@ class SpatialPlant(NamedTuple):
         root: The middle link, from 0.
         constants: Constants by `layout` and link, (constants, padded links).
         kinds: Which way the axes of the joints point, by `layout`, int64, (joints,).
+        axes: Axes of the joints in link axes, (joints, 3).
         frames: Of every joint three axes of which the third is its own, (joints, 9).
         thrusters: Number of thrusters.
         thruster_places: What thrusters push with, see `step.push`: thruster and first row of a
@@ -60,6 +61,7 @@ class SpatialPlant(NamedTuple):
     root: int
     constants: NDArray[np.float64]
     kinds: NDArray[np.int64]
+    axes: NDArray[np.float64]
     frames: NDArray[np.float64]
     thrusters: int
     thruster_places: NDArray[np.int64]
