@@ -43,8 +43,6 @@ from usm_gym.world import Array, Kernels, World, world_of
 # Physics steps times links of the longest episode, as in the plane.
 MOST_LINK_STEPS = 2_000_000_000
 AXES = 3
-# Attitude errors are to vanish as a critically damped motion of 1.2 rad/s would, s.
-ATTITUDE_LEAD = 5.0 / 3.0
 
 
 @compiled
@@ -219,7 +217,6 @@ class SpatialWorld(World):
     axes: ClassVar[tuple[str, ...]] = ("x", "y", "z")
     attitude: ClassVar[tuple[str, ...]] = ("pitch", "yaw")
     watched: ClassVar[tuple[str, ...]] = ("roll",)
-    attitude_lead: ClassVar[float] = ATTITUDE_LEAD
     kernels: ClassVar[Kernels] = Kernels(observe, run_singles, run_lanes, run_threads)
 
     @cached_property

@@ -157,8 +157,6 @@ class World(ABC):
         attitude: Names of the angles of the attitude error that are controlled and scored; their
             errors are observed one after the other, as `ANGLE_error`.
         watched: Names of angles that are reported, but neither controlled nor scored.
-        attitude_lead: How far ahead the controller of the attitude looks, by the rates of its
-            errors, s; 0 where no rate is observed.
         kernels: The compiled entry points.
         lost_error: Further from its reference than this in any axis a robot is lost, m.
     """
@@ -167,7 +165,6 @@ class World(ABC):
     axes: ClassVar[tuple[str, ...]]
     attitude: ClassVar[tuple[str, ...]] = ()
     watched: ClassVar[tuple[str, ...]] = ()
-    attitude_lead: ClassVar[float] = 0.0
     kernels: ClassVar[Kernels]
 
     @property
@@ -268,8 +265,8 @@ class World(ABC):
         Args:
             observation: Observations, (batch, numbers).
             matrices: Where to write: the forces along the axes, N, then the moments about the
-                attitude's angles, N m, that unit forces of the thrusters make,
-                (batch, axes + angles, thrusters).
+                attitude's angles and those that are watched, N m, that unit forces of the thrusters
+                make, (batch, axes + angles, thrusters).
         """
 
 

@@ -12,11 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import compiled, piece, shared
-from usm_gym.plant.thrusters import allocate, delivered, lag_shares
+from usm_gym.plant.thrusters import allocate, delivered, lag_shares, saturated
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import World, world_of
 
 Array = NDArray[np.float64]
+
+
+# The controller of the attitude in space: it looks so far ahead, by the rates, s, as is fit for a
+# pole pair at 1.2 rad/s; it damps roll, N m s/rad, with so much moment at most, N m; and the moment
+# in roll is soft, N m/N, because thrusters that hardly have an arm about that axis would need much
+# force for it.
+ATTITUDE_LEAD, ROLL_DAMPING, ROLL_LIMIT, ROLL_SOFTNESS = 5.0 / 3.0, 3.0, 0.5, 0.05
 
 
 class Model(NamedTuple):
@@ -35,9 +42,9 @@ class Model(NamedTuple):
         reference_velocity: The same.
         reference_acceleration: The same.
         attitude_error: The same.
-        attitude_rate: The same of the rates of roll, pitch and yaw; -1 without any.
+        watched: Whether roll is to be damped, softly.
+        attitude_rate: Index of the rates of roll, pitch and yaw; -1 if no rate is observed.
         reference_rate: The same of the references of pitch and yaw.
-        attitude_lead: How far ahead the controller of the attitude looks, s.
         thruster_command: The same.
         thruster_limit: The same.
         position_age: The same; -1 if positions have no age.
@@ -56,9 +63,9 @@ class Model(NamedTuple):
     reference_velocity: int
     reference_acceleration: int
     attitude_error: int
+    watched: bool
     attitude_rate: int
     reference_rate: int
-    attitude_lead: float
     thruster_command: int
     thruster_limit: int
     position_age: int
@@ -79,7 +86,7 @@ class Signals(NamedTuple):
         u: Applied force over the mass less the reference's acceleration, m/s^2, (batch, axes).
         velocity: Velocity of the reference, m/s, (batch, axes).
         acceleration: Acceleration of the reference, m/s^2, (batch, axes).
-        allocation: Allocation matrices, (batch, axes + angles, thrusters).
+        allocation: Allocation matrices, (batch, `rows_of`, thrusters).
         observation: All that is measured, (batch, numbers).
     """
 
@@ -123,9 +130,9 @@ def model_of(nominal: Nominal, lag: bool = False) -> Model:
         reference_velocity=first["reference_velocity"],
         reference_acceleration=first["reference_acceleration"],
         attitude_error=first[angles[0]] if angles else layout.size,
+        watched=len(world.watched) > 0,
         attitude_rate=first.get("angular_velocity", -1),
         reference_rate=first.get("reference_rates", -1),
-        attitude_lead=world.attitude_lead,
         thruster_command=first["thruster_command"],
         thruster_limit=first["thruster_limit"],
         position_age=first.get("position_age", -1),
@@ -182,9 +189,9 @@ def sense(state, model, signals):
 def act(observation, state, model, allocation, force, attitude_gain, action):
     """Fill in the actions that make the forces (N) and the moments that turn the attitude back.
 
-    A moment is proportional to the error of an angle, as it will be a lead ahead.
+    A moment is proportional to the error of an angle, in space as it will be a lead ahead.
     """
-    rows = model.axes + model.angles
+    rows = rows_of(model)
     forces, wrench, work = np.empty(model.thrusters), np.empty(rows), np.empty((2 * rows + 1, rows))
     for b in range(observation.shape[0]):
         seen, T = observation[b], allocation[b]
@@ -192,16 +199,20 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
             wrench[axis] = force[b, axis]
         for i in range(model.angles):
             angle_error = physical(seen, model, model.attitude_error + i)
-            if model.attitude_lead > 0.0:
+            if model.attitude_rate >= 0:
                 rate = physical(seen, model, model.attitude_rate + 1 + i)
                 rate -= physical(seen, model, model.reference_rate + i)
-                angle_error += model.attitude_lead * rate
+                angle_error += ATTITUDE_LEAD * rate
             wrench[model.axes + i] = -attitude_gain * angle_error
+        if model.watched:
+            rate = physical(seen, model, model.attitude_rate)
+            wrench[rows - 1] = saturated(-ROLL_DAMPING * rate, ROLL_LIMIT)
         # Of three rows the compiler unrolls the loops.
         if rows == 3:
-            allocate(T, wrench, 3, work, forces)
+            allocate(T, wrench, 3, 0.0, work, forces)
         else:
-            allocate(T, wrench, rows, work, forces)
+            softness = ROLL_SOFTNESS * ROLL_SOFTNESS if model.watched else 0.0
+            allocate(T, wrench, rows, softness, work, forces)
         limit = physical(seen, model, model.thruster_limit)
         state[b, 0] = 1.0
         for j in range(model.thrusters):
@@ -209,6 +220,12 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
         for axis in range(model.axes):
             for j in range(model.thrusters):
                 state[b, 1 + axis * model.thrusters + j] = T[axis, j]
+
+
+@shared
+def rows_of(model: Model) -> int:
+    """Rows of an allocation matrix: forces, moments on the attitude, one that damps roll."""
+    return model.axes + model.angles + (1 if model.watched else 0)
 
 
 @shared
@@ -223,7 +240,7 @@ def signals_of(
     """Signals of a batch; the allocation is in, `sense` and a navigator fill in the rest."""
     size = len(observation)
     y, u, velocity, acceleration, rate, disturbance, thrust = np.empty((7, size, model.axes))
-    allocation = np.empty((size, model.axes + model.angles, model.thrusters))
+    allocation = np.empty((size, rows_of(model), model.thrusters))
     world.allocate(observation, allocation)
     return Signals(
         started=np.empty(size),

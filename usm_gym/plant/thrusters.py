@@ -94,8 +94,11 @@ def mean_force(block, like, rows, j):
 
 
 @piece
-def allocate(T, wrench, rows, work, forces):
-    """Fill in the forces of least norm that make a wrench: f = T^T (T T^T)^-1 wrench.
+def allocate(T, wrench, rows, softness, work, forces):
+    """Fill in the forces of least norm that make a wrench: f = T^T (T T^T + S)^-1 wrench.
+
+    S is 0 but for the last row, which may be soft: where much force would be needed for it, it is
+    made in part (damped least squares).
 
     The normal equations are solved by the decomposition L D L^T.
 
@@ -103,6 +106,7 @@ def allocate(T, wrench, rows, work, forces):
         T: Allocation matrix, (rows, thrusters).
         wrench: Forces and moments, N and N m, (rows,).
         rows: How many; where it is a constant, the compiler unrolls the loops.
+        softness: S of the last row, in the square of its unit over N.
         work: Room for D and what L is of it, for L, and for the solution, (2 rows + 1, rows).
         forces: Where to write, N, (thrusters,).
     """
@@ -118,6 +122,8 @@ def allocate(T, wrench, rows, work, forces):
                     taken += work[L + i, k] * work[L + j, k] * work[k, k]
                 else:
                     taken += work[i, k] * work[L + j, k]
+            if i == j and i == rows - 1:
+                total += softness
             work[i, j] = total - taken
             work[L + i, j] = work[i, j] / work[j, j]
     for i in range(rows):

@@ -213,11 +213,11 @@ def spatial_allocations(observation, scale, starts, plant, thrusters, matrices):
         thrusters: Of each thruster the link, from 0, its place from the link's middle, m, and its
             direction, in link axes, (thrusters, 7).
         matrices: Where to write: forces along x, y, z, moments about y, z and x of the middle link
-            through the centre of mass, (batch, 6 or less, thrusters).
+            through the centre of mass, (batch, 6, thrusters).
     """
     links, root = plant.links, plant.root
     centre, frame = np.empty((links, 3)), np.empty((links, 9))
-    phi, wrench = np.empty(links - 1), np.empty(6)
+    phi = np.empty(links - 1)
     attitude, angles = starts[SPATIAL_ENTRY.attitude], starts[SPATIAL_ENTRY.joint_angles]
     for b in range(observation.shape[0]):
         seen = observation[b]
@@ -242,15 +242,13 @@ def spatial_allocations(observation, scale, starts, plant, thrusters, matrices):
             )
             moment = cross(arm, push)
             for k in range(3):
-                wrench[k] = push[k]
+                matrices[b, k, j] = push[k]
                 turned = 3 * ((k + 1) % 3)
-                wrench[3 + k] = (
+                matrices[b, 3 + k, j] = (
                     moment[0] * frame[root, turned]
                     + moment[1] * frame[root, turned + 1]
                     + moment[2] * frame[root, turned + 2]
                 )
-            for k in range(matrices.shape[1]):
-                matrices[b, k, j] = wrench[k]
 
 
 @piece

@@ -78,7 +78,7 @@ def correct_all(base_action, allocation, limit, residual, wrench, command):  # t
     for b in range(len(command)):
         if wrench:
             wanted[: residual.shape[1]] = residual[b]
-            allocate(allocation[b], wanted, 3, work, forces)
+            allocate(allocation[b], wanted, 3, 0.0, work, forces)
         else:
             forces[:] = residual[b]
         for j in range(forces.size):

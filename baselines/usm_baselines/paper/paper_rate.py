@@ -243,7 +243,7 @@ def closed_loop(blocks, plant, mass, law, noise, every, record):
             allocation_matrix(
                 sine, cosine, plant.l, plant.thruster_links, plant.thruster_is_normal, T
             )
-            allocate(T, wrench, 3, work, commands)
+            allocate(T, wrench, 3, 0.0, work, commands)
             saturate(T, row[LIMIT], commands, force)
             for j in range(thrusters):
                 row[targets + j] = delivered(commands[j], row[delivery + j], row[DEAD_BAND])

@@ -34,7 +34,7 @@ def fill_in(sine, cosine, l, links, is_normal, T):  # type: ignore[no-untyped-de
 
 @numba.njit
 def solve(T, wrench, forces):  # type: ignore[no-untyped-def]
-    thrusters.allocate(T, wrench, 3, np.empty((7, 3)), forces)
+    thrusters.allocate(T, wrench, 3, 0.0, np.empty((7, 3)), forces)
 
 
 def allocation_matrix(robot: Robot, theta: Array) -> Array:
