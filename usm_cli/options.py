@@ -16,6 +16,7 @@ import joblib
 from usm_gym.support.files import check_writable, parse_json
 from usm_gym.support.validation import UsageError, require
 from usm_gym.task.conditions import Conditions, conditions_of
+from usm_gym.task.modes import presets_of
 
 # How long a cluster may take to accept a connection, s.
 CONNECTION_TIME = 10.0
@@ -95,11 +96,12 @@ def check_reachable(address: str) -> None:
         raise ConnectionError(f"no Ray cluster at {address}: {error}") from error
 
 
-def parse_conditions(text: str) -> Conditions:
-    """Read conditions from a preset's name or a JSON object."""
+def parse_conditions(text: str, mode: str = "operation") -> Conditions:
+    """Read the conditions of a mode from a preset's name or a JSON object."""
+    presets = presets_of(mode)
     if text.lstrip()[:1] not in ("{", "["):
-        return conditions_of(text)
-    return conditions_of(parse_json(text, f"--conditions {text}"))
+        return conditions_of(text, presets)
+    return conditions_of(parse_json(text, f"--conditions {text}"), presets)
 
 
 def count(arguments: Any, option: str, default: int, least: int = 1) -> int:

@@ -18,7 +18,7 @@ from usm_baselines.benchmark.scoring import (
     score_all,
 )
 from usm_baselines.contender import Contender
-from usm_baselines.tiers import TIERS, competitors, short_list
+from usm_baselines.tiers import competitors, short_list
 
 from usm_cli.options import add_computing, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
@@ -26,9 +26,9 @@ from usm_gym.evaluation import BATCH, Evaluation
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.validation import explaining, require
-from usm_gym.task.conditions import PRESETS, Conditions
+from usm_gym.task.conditions import PRESETS
+from usm_gym.task.modes import ALL_MODES, AnyMode, AnyScenario, presets_of, read_scenario
 from usm_gym.task.nominal import shared_nominal
-from usm_gym.task.scenario import MODES, Mode, Scenario
 
 # Stands for all competitors among the names of policies.
 ALL = "all"
@@ -64,7 +64,7 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
         parser.set_defaults(episodes=None)
     else:
         add("--episodes", type=int, metavar="N", help="number of sampled scenarios (default: 50)")
-    add("--mode", choices=MODES, help="mode of sampled scenarios (default: operation)")
+    add("--mode", choices=ALL_MODES, help="mode of sampled scenarios (default: operation)")
     add(
         "--conditions",
         metavar="C",
@@ -86,11 +86,12 @@ def add_scoring(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def chosen_contenders(names: str | None, conditions: Conditions) -> list[Contender]:
-    """Get the policies that `--policies` names, or the short list for conditions."""
+def chosen_contenders(names: str | None, scenario: AnyScenario) -> list[Contender]:
+    """Get the policies that `--policies` names, or the short list for scenarios like one."""
+    meant = scenario.conditions, scenario.mode
     if names is None:
-        return [named(id) for id in short_list(conditions)]
-    listed = [[name] if name != ALL else competitors(conditions) for name in split(names)]
+        return [named(id) for id in short_list(*meant)]
+    listed = [[name] if name != ALL else competitors(*meant) for name in split(names)]
     return [named(name) for name in dict.fromkeys(chain.from_iterable(listed))]
 
 
@@ -116,8 +117,8 @@ def suite_name(arguments: argparse.Namespace) -> str | None:
 
     The conditions of a tier have a suite of their own, as their joint motion is another.
     """
-    tier = arguments.conditions
-    default = f"operation-{tier}" if tier in TIERS else "operation"
+    default = f"operation-{arguments.conditions}"
+    default = default if default in NAMES else "operation"
     return None if sampled(arguments) else arguments.suite or default
 
 
@@ -127,14 +128,14 @@ def seeds(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"seed": arguments.seed or 0} if name is None else {"suite": name}
 
 
-def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
+def chosen_scenarios(arguments: argparse.Namespace) -> list[AnyScenario]:
     """Get the scenarios that the options choose."""
-    given = arguments.conditions
-    conditions = None if given is None else parse_conditions(given)
-    name = suite_name(arguments)
+    given, name = arguments.conditions, suite_name(arguments)
     if name is not None:
         scenarios = read_suite(name)
-        return [scenario.under(conditions) for scenario in scenarios] if conditions else scenarios
+        if given is None:
+            return scenarios
+        return [each.under(parse_conditions(given, each.mode)) for each in scenarios]
     require(
         arguments.suite is None,
         "--suite",
@@ -143,11 +144,12 @@ def chosen_scenarios(arguments: argparse.Namespace) -> list[Scenario]:
     )
     episodes = count(arguments, "episodes", 50)
     seed = count(arguments, "seed", 0, least=0)
-    mode: Mode = arguments.mode or "operation"
-    return unseen(mode, conditions or Conditions(), seed, episodes)
+    mode: AnyMode = arguments.mode or "operation"
+    conditions = presets_of(mode)["field"] if given is None else parse_conditions(given, mode)
+    return unseen(mode, conditions, seed, episodes)
 
 
-def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
+def chosen_scenario(arguments: argparse.Namespace) -> AnyScenario:
     """Get the one scenario that the options choose."""
     index = count(arguments, "scenario", 0, least=0)
     if sampled(arguments):
@@ -157,7 +159,7 @@ def chosen_scenario(arguments: argparse.Namespace) -> Scenario:
     return scenarios[index]
 
 
-def read_suite(name: str) -> list[Scenario]:
+def read_suite(name: str) -> list[AnyScenario]:
     """Read the scenarios of a frozen suite, or of a JSON file with a list of them."""
     if not name.endswith(".json"):
         return suite(name)
@@ -168,12 +170,12 @@ def read_suite(name: str) -> list[Scenario]:
     scenarios = []
     for index, data in enumerate(listed):
         with explaining(f"{name}, scenario {index}"):
-            scenarios.append(Scenario.from_dict(data))
+            scenarios.append(read_scenario(data))
     return scenarios
 
 
 def jobs(
-    contenders: Iterable[Contender], scenarios: Sequence[Scenario], time_limit: float
+    contenders: Iterable[Contender], scenarios: Sequence[AnyScenario], time_limit: float
 ) -> list[Job]:
     """Make one job per policy, all with the same scenarios.
 

@@ -12,7 +12,7 @@ from usm_gym.evaluation import Trajectory, rollout
 from usm_gym.rendering.picture import Picture, Recorder
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError, in_one_line
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.modes import AnyScenario
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Take:
     trajectory: Trajectory
 
 
-def instants(scenario: Scenario, fps: float, speed: float) -> list[int]:
+def instants(scenario: AnyScenario, fps: float, speed: float) -> list[int]:
     """The control instants that the frames of an episode show, played `speed` times real time."""
     frames = max(1, round(fps * scenario.duration / speed))
     times = np.arange(frames + 1) * (speed / fps)
@@ -43,7 +43,7 @@ def instants(scenario: Scenario, fps: float, speed: float) -> list[int]:
 
 def take(
     contender: Contender,
-    scenario: Scenario,
+    scenario: AnyScenario,
     shown: Sequence[int],
     progress: Callable[[float], None] = lambda episodes: None,
 ) -> Take:

@@ -19,7 +19,14 @@ Gain = Annotated[Number, Field(ge=-1e12, le=1e12)]
 # tuned with other weights on thrust variation, and show what a law can do at less or more of it.
 TUNED = Path(__file__).with_name("tuned")
 FRONT = TUNED / "front"
-FOLDERS = {"tuned": "", "basin": "basin", "sea": "sea"}
+FOLDERS = {
+    "tuned": "",
+    "basin": "basin",
+    "sea": "sea",
+    "eely": "eely",
+    "eely-basin": "eely/basin",
+    "eely-sea": "eely/sea",
+}
 
 
 @dataclass(frozen=True)

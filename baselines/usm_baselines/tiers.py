@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from usm_baselines.registry import Registration, entry, ids
-from usm_gym.task.conditions import Conditions, preset_of
+from usm_gym.task.conditions import IN_SPACE, Conditions, preset_of
+from usm_gym.task.modes import AnyMode, in_space
 
 # Presets for which laws are tuned anew. To all other conditions go the policies that are meant for
-# `field`.
-TIERS = ("basin", "sea")
+# `field`, in space those for `field` there.
+TIERS = ("basin", "sea", "field3d", "basin3d", "sea3d")
 # The policies with the paper's gains, which meet all conditions.
 PAPER = ("sta", "pd")
 # Of the policies that are meant for `field`, one for every answer to the question which controller
@@ -28,20 +29,21 @@ SHORT_LIST = (
 )
 
 
-def tier_of(conditions: Conditions) -> str:
-    """The preset whose policies meet some conditions: one of `TIERS`, or "field"."""
+def tier_of(conditions: Conditions, mode: AnyMode = "operation") -> str:
+    """The preset whose policies meet some conditions in a mode: one of `TIERS`, or "field"."""
     preset = preset_of(conditions)
-    return preset if preset in TIERS else "field"
+    usual = "field" + IN_SPACE if in_space(mode) else "field"
+    return preset if preset in TIERS else usual
 
 
-def meant_for(conditions: Conditions) -> list[str]:
-    """Names of the policies that are meant for some conditions.
+def meant_for(conditions: Conditions, mode: AnyMode = "operation") -> list[str]:
+    """Names of the policies that are meant for some conditions in a mode.
 
     For a tier they are those that are tuned or trained for it, the paper's two, and those that are
     given true state and have no gains to tune; for all other conditions all but those that are
     tuned for a tier.
     """
-    tier = tier_of(conditions)
+    tier = tier_of(conditions, mode)
 
     def meant(id: str, policy: Registration) -> bool:
         if tier not in TIERS:
@@ -52,20 +54,20 @@ def meant_for(conditions: Conditions) -> list[str]:
     return [id for id in ids() if meant(id, entry(id))]
 
 
-def short_list(conditions: Conditions) -> list[str]:
+def short_list(conditions: Conditions, mode: AnyMode = "operation") -> list[str]:
     """Names of the competitors that answer which controller to take under some conditions.
 
     For a tier they are all that are meant for it, as every law has only one set of gains there.
     """
-    if tier_of(conditions) not in TIERS:
+    if tier_of(conditions, mode) not in TIERS:
         return list(SHORT_LIST)
-    return competitors(conditions)
+    return competitors(conditions, mode)
 
 
-def competitors(conditions: Conditions) -> list[str]:
+def competitors(conditions: Conditions, mode: AnyMode = "operation") -> list[str]:
     """Names of the competitors that are meant for some conditions.
 
     Those on request are left out, unless the short list has them.
     """
-    policies = {id: entry(id) for id in meant_for(conditions) if not entry(id).privileged}
+    policies = {id: entry(id) for id in meant_for(conditions, mode) if not entry(id).privileged}
     return [id for id, each in policies.items() if id in SHORT_LIST or not each.on_request]

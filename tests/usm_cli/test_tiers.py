@@ -12,8 +12,8 @@ from usm_baselines import registry
 
 from usm_cli import selection
 from usm_cli.program import main
-from usm_gym.suites import suite
-from usm_gym.task.conditions import PRESETS
+from usm_gym.suites import suite, unseen
+from usm_gym.task.modes import presets_of
 
 
 @pytest.fixture
@@ -64,12 +64,13 @@ def test_tables_of_scans_are_readable(width, chosen, monkeypatch, capsys):
 
 
 def test_the_short_list_has_competitors_and_all_has_them_all():
-    for conditions in (PRESETS["field"], PRESETS["basin"]):
-        everyone = [each.name for each in selection.chosen_contenders("all", conditions)]
-        short = [each.name for each in selection.chosen_contenders(None, conditions)]
+    for mode, tier in (("operation", "field"), ("operation", "basin"), ("operation3d", "field")):
+        (scenario,) = unseen(mode, presets_of(mode)[tier], 0, 1)
+        everyone = [each.name for each in selection.chosen_contenders("all", scenario)]
+        short = [each.name for each in selection.chosen_contenders(None, scenario)]
         assert {"sta", "pd"} <= set(short) <= set(everyone)
         assert not any(registry.entry(id).privileged for id in everyone)
-        more = selection.chosen_contenders("oracle,all,sta", conditions)
+        more = selection.chosen_contenders("oracle,all,sta", scenario)
         assert [each.name for each in more] == ["oracle", *everyone]
 
 

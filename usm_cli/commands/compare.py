@@ -29,7 +29,7 @@ from usm_gym.support.results import Provenance
 from usm_gym.support.text import degrees, figures, mm
 from usm_gym.support.validation import require
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.stored_scenario import OtherScenario
 
 DESCRIPTION = """\
@@ -61,7 +61,7 @@ class PolicyScores:
         scores: What is compared of the episodes, by metric: see `metrics_of`.
     """
 
-    scenarios: list[Scenario | OtherScenario]
+    scenarios: list[AnyScenario | OtherScenario]
     scores: Scores
 
 
@@ -89,12 +89,12 @@ def run(arguments: argparse.Namespace) -> None:
     require(names[0] != names[1], "B", names[1], "another policy than A")
     files = {name: read_results(name) for name in names if is_results(name)}
     missing = [named(name) for name in names if name not in files]
-    scenarios: Sequence[Scenario | OtherScenario]
+    scenarios: Sequence[AnyScenario | OtherScenario]
     scenarios = common_scenarios(arguments, names, files) if files else chosen_scenarios(arguments)
-    planar = [scenario for scenario in scenarios if isinstance(scenario, Scenario)]
-    known = not missing or len(planar) == len(scenarios)
+    ours = [scenario for scenario in scenarios if not isinstance(scenario, OtherScenario)]
+    known = not missing or len(ours) == len(scenarios)
     require(known, "policies", names, "two results, as these scenarios are of another world")
-    chosen = jobs(missing, planar, arguments.time_limit) if missing else []
+    chosen = jobs(missing, ours, arguments.time_limit) if missing else []
     scores = {name: part.scores for name, part in files.items()}
     evaluated, refused = by_name(chosen, scored(chosen, arguments))
     leave_if_refused(refused)
@@ -118,7 +118,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def common_scenarios(
     arguments: argparse.Namespace, names: Sequence[str], files: Mapping[str, PolicyScores]
-) -> list[Scenario | OtherScenario]:
+) -> list[AnyScenario | OtherScenario]:
     """The common scenarios of the files; refuse files with different ones."""
     options = ("suite", "seed", "episodes", "mode", "conditions")
     given = [f"--{name}" for name in options if getattr(arguments, name) is not None]

@@ -30,7 +30,7 @@ from usm_gym.evaluation import Evaluation
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
 from usm_gym.support.text import counted
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.modes import AnyScenario
 
 DESCRIPTION = """\
 Score policies. The score of an episode is the largest true position error after settling (5 s, in
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.output:
         check_writable(arguments.output)
     scenarios = chosen_scenarios(arguments)
-    contenders = chosen_contenders(arguments.policies, scenarios[0].conditions)
+    contenders = chosen_contenders(arguments.policies, scenarios[0])
     chosen = jobs(contenders, scenarios, arguments.time_limit)
     scores, refused = by_name(chosen, scored(chosen, arguments))
     known = {job.contender.name: job.contender for job in chosen}
@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def write(
     arguments: argparse.Namespace,
-    scenarios: Sequence[Scenario],
+    scenarios: Sequence[AnyScenario],
     known: Mapping[str, Contender],
     scores: Mapping[str, Evaluation],
     refused: Mapping[str, str],

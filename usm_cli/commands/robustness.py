@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
     quantity = QUANTITIES[arguments.vary]
     values = quantity.values if arguments.values is None else parse_values(arguments.values)
     scenarios = chosen_scenarios(arguments)
-    contenders = chosen_contenders(arguments.policies, scenarios[0].conditions)
+    contenders = chosen_contenders(arguments.policies, scenarios[0])
     jobs(contenders, scenarios, arguments.time_limit)  # refuses policies that cannot be made
     chosen = robustness.jobs(contenders, scenarios, quantity, values, arguments.time_limit)
     folder = output_folder(arguments.output)

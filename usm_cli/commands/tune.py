@@ -14,9 +14,9 @@ from usm_cli.terminal import output_console, progress_bar
 from usm_gym.support.files import check_writable, holding, write_json
 from usm_gym.support.provenance import provenance
 from usm_gym.support.text import figures
-from usm_gym.task.conditions import FIELD, PRESETS
+from usm_gym.task.conditions import PRESETS
 from usm_gym.task.metrics import VARIATION_WEIGHT
-from usm_gym.task.scenario import MODES
+from usm_gym.task.modes import ALL_MODES
 
 DESCRIPTION = """\
 Search for the gains of a policy with the smallest objective: the mean over scenarios of the largest
@@ -49,7 +49,7 @@ def add_to(subparsers: Any) -> None:
     add("--trials", type=int, metavar="N", help="sets of gains to try (default: 300)")
     add("--episodes", type=int, metavar="N", help="scenarios per set (default: 50)")
     add("--weight", type=float, metavar="W", help="mm per N/s of variation (default: 0.002)")
-    add("--mode", choices=MODES, default="operation", help="default: operation")
+    add("--mode", choices=ALL_MODES, default="operation", help="default: operation")
     add("--conditions", metavar="C", help=f"{', '.join(PRESETS)}, or JSON (default: field)")
     add("--seed", type=int, metavar="S", help="seed of scenarios and search (default: 0)")
     add("--output", metavar="FILE", help="file of gains and provenance (default: POLICY.json)")
@@ -65,13 +65,12 @@ def run(arguments: argparse.Namespace) -> None:
 
     output = Path(arguments.output or f"{arguments.policy}.json")
     check_writable(output)
-    conditions = arguments.conditions
     problem = Problem(
         policy=arguments.policy,
         budget=Budget(count(arguments, "trials", 300), count(arguments, "episodes", 50)),
         weight=VARIATION_WEIGHT if arguments.weight is None else arguments.weight,
         mode=arguments.mode,
-        conditions=FIELD if conditions is None else parse_conditions(conditions),
+        conditions=parse_conditions(arguments.conditions or "field", arguments.mode),
         seed=count(arguments, "seed", 0, least=0),
     )
     storage = arguments.storage or f"sqlite:///{output.with_suffix('.db').absolute()}"

@@ -42,6 +42,7 @@ from usm_gym.support.text import counted, figures, listed
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import OtherScenario
 
@@ -291,7 +292,7 @@ def advice(tiers: Mapping[str, Mapping[str, CompetitorScores]]) -> list[Tables]:
 
 
 def conditions(
-    label: str, name: str, scenarios: Sequence[Scenario | OtherScenario], besides: str = ""
+    label: str, name: str, scenarios: Sequence[AnyScenario | OtherScenario], besides: str = ""
 ) -> list[Tables]:
     """The conditions of a result, if its scenarios are of the planar robot."""
     planar = planar_only(scenarios)
@@ -301,7 +302,7 @@ def conditions(
     return [Tables("Conditions", CONDITIONS + besides, label, table)]
 
 
-def planar_only(scenarios: Sequence[Scenario | OtherScenario]) -> list[Scenario]:
+def planar_only(scenarios: Sequence[AnyScenario | OtherScenario]) -> list[Scenario]:
     """The scenarios, if all are of the planar robot; otherwise none."""
     planar = [scenario for scenario in scenarios if isinstance(scenario, Scenario)]
     return planar if len(planar) == len(scenarios) else []
@@ -313,7 +314,7 @@ def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
 
 
 def replay(
-    scenarios: Sequence[Scenario | OtherScenario],
+    scenarios: Sequence[AnyScenario | OtherScenario],
     rows: Mapping[str, Scores | None],
     axes: Sequence[str],
     choice: Choice,

@@ -13,8 +13,7 @@ from importlib.resources import files
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.sampling import sample
-from usm_gym.task.scenario import Mode, Scenario
+from usm_gym.task.modes import AnyMode, AnyScenario, read_scenario, sample_of
 
 NAMES = (
     "operation",
@@ -24,10 +23,15 @@ NAMES = (
     "torpedo",
     "torpedo-sea",
     "table1",
+    "operation3d",
+    "operation3d-basin",
+    "operation3d-sea",
+    "operation3d-neutral",
+    "torpedo3d",
 )
 
 
-def suite(name: str) -> list[Scenario]:
+def suite(name: str) -> list[AnyScenario]:
     """The scenarios of a frozen suite.
 
     Raises:
@@ -37,12 +41,12 @@ def suite(name: str) -> list[Scenario]:
     return list(_read(name))
 
 
-def unseen(mode: Mode, conditions: Conditions, seed: int, episodes: int) -> list[Scenario]:
+def unseen(mode: AnyMode, conditions: Conditions, seed: int, episodes: int) -> list[AnyScenario]:
     """Scenarios sampled under a seed, which no training and no tuning ever meets."""
-    return [sample(mode, conditions, stream(seed, EVALUATION, i)) for i in range(episodes)]
+    return [sample_of(mode, conditions, stream(seed, EVALUATION, i)) for i in range(episodes)]
 
 
 @cache
-def _read(name: str) -> tuple[Scenario, ...]:
+def _read(name: str) -> tuple[AnyScenario, ...]:
     text = files(__package__).joinpath(f"{name}.json").read_text(encoding="utf-8")
-    return tuple(Scenario.from_dict(data) for data in json.loads(text)["scenarios"])
+    return tuple(read_scenario(data) for data in json.loads(text)["scenarios"])

@@ -242,6 +242,10 @@ SPATIAL_PRESETS: dict[str, Conditions] = {
 }
 
 
+# Tells presets, and the suites and modes in space, from those in the plane.
+IN_SPACE = "3d"
+
+
 def conditions_of(
     value: str | Mapping[str, Any] | Conditions, presets: Mapping[str, Conditions] = PRESETS
 ) -> Conditions:
@@ -264,8 +268,12 @@ def conditions_of(
 
 
 def preset_of(conditions: Conditions | None) -> str:
-    """The name of the preset that some conditions are, in plane or space; empty if of none."""
-    presets = (*PRESETS.items(), *SPATIAL_PRESETS.items())
+    """The name of the preset that some conditions are, in space with `IN_SPACE` behind it.
+
+    It is empty if they are none.
+    """
+    spatial = ((name + IN_SPACE, preset) for name, preset in SPATIAL_PRESETS.items())
+    presets = (*PRESETS.items(), *spatial)
     return next((name for name, preset in presets if preset == conditions), "")
 
 

@@ -192,6 +192,20 @@ class Scenario:
         )
         return positions
 
+    def bending(self, further: float = 1.0, faster: float = 1.0) -> Scenario:
+        """The same episode with joints that move further or faster, by factors.
+
+        Raises:
+            ValueError: If nothing filters the joint references, so that they cannot be faster.
+        """
+        motion = self.inspection
+        changed = dataclasses.replace(
+            motion,
+            deflections=tuple(further * angle for angle in motion.deflections),
+            filter_frequency=times_faster(motion.filter_frequency, faster),
+        )
+        return dataclasses.replace(self, inspection=changed)
+
     def under(self, conditions: Conditions) -> Scenario:
         """The same episode under other conditions; water and gains are redrawn from its seed."""
         body = self.body
@@ -216,6 +230,17 @@ class Scenario:
 
 
 _ADAPTER = TypeAdapter(Scenario)
+
+
+def times_faster(frequency: float | None, factor: float) -> float | None:
+    """The frequency of a filter of joint references that are faster by a factor.
+
+    Raises:
+        ValueError: If there is no filter.
+    """
+    filtered = frequency is not None or factor == 1.0
+    require(filtered, "filter_frequency", frequency, "a number that can be varied")
+    return None if frequency is None else factor * frequency
 
 
 def mode_of(value: Any) -> Mode:

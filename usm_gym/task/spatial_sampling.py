@@ -83,8 +83,8 @@ class SpatialRecipe:
         return Scan(
             bending_joints=bending_joints,
             times=tuple(times.tolist()),
-            pans=tuple((sizes * np.cos(directions)).tolist()),
-            tilts=tuple((sizes * np.sin(directions)).tolist()),
+            pans=tuple((sizes * np.cos(directions) + 0.0).tolist()),
+            tilts=tuple((sizes * np.sin(directions) + 0.0).tolist()),
             filter_frequency=filter_frequency,
         )
 

@@ -22,6 +22,7 @@ from usm_gym.task.conditions import (
     require_whole_steps,
 )
 from usm_gym.task.nominal import Nominal, nominal_under
+from usm_gym.task.scenario import times_faster
 from usm_gym.task.sensing import Sensing, sensing
 from usm_gym.task.spatial_guidance import space_positions
 from usm_gym.task.spatial_water import SpatialWater, draw_spatial_water
@@ -189,6 +190,21 @@ class SpatialScenario:
             positions,
         )
         return positions
+
+    def bending(self, further: float = 1.0, faster: float = 1.0) -> SpatialScenario:
+        """The same episode with joints that move further or faster, by factors.
+
+        Raises:
+            ValueError: If nothing filters the joint references, so that they cannot be faster.
+        """
+        scan = self.scan
+        changed = dataclasses.replace(
+            scan,
+            pans=tuple(further * angle for angle in scan.pans),
+            tilts=tuple(further * angle for angle in scan.tilts),
+            filter_frequency=times_faster(scan.filter_frequency, faster),
+        )
+        return dataclasses.replace(self, scan=changed)
 
     def under(self, conditions: Conditions) -> SpatialScenario:
         """The same episode under other conditions; water and gains are redrawn from its seed."""

@@ -10,12 +10,14 @@ from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter
 
 from usm_gym.support.results import Part
 from usm_gym.support.validation import require, validated
+from usm_gym.task.modes import AnyScenario, read_scenario
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.spatial_scenario import SpatialScenario
 
 
 @validated
 class OtherScenario(Part):
-    """A scenario of another world than the planar robot's, which a file can only describe.
+    """A scenario of another world than those of this package, which a file can only describe.
 
     Attributes:
         world: Name of its type.
@@ -27,25 +29,25 @@ class OtherScenario(Part):
     fields: Mapping[str, Any]
 
 
-def stored(value: Any) -> Scenario | OtherScenario:
+def stored(value: Any) -> AnyScenario | OtherScenario:
     """A scenario of any world, or one in JSON's types, as results hold it.
 
     Raises:
         UsageError: If it is not a scenario.
     """
-    if isinstance(value, (Scenario, OtherScenario)):
+    if isinstance(value, (Scenario, SpatialScenario, OtherScenario)):
         return value
     if isinstance(value, Mapping):
         other = "world" in value
-        return _OTHER.validate_python(value) if other else Scenario.from_dict(value)
+        return _OTHER.validate_python(value) if other else read_scenario(value)
     require(is_dataclass(value), "scenario", value, "a frozen dataclass, or a dict of fields")
     fields = TypeAdapter(type(value)).dump_python(value, mode="json")
     return OtherScenario(world=type(value).__name__, fields=fields)
 
 
-def as_json(value: Scenario | OtherScenario) -> dict[str, Any]:
+def as_json(value: AnyScenario | OtherScenario) -> dict[str, Any]:
     """A scenario in JSON's types."""
-    if isinstance(value, Scenario):
+    if not isinstance(value, OtherScenario):
         return value.to_dict()
     fields: dict[str, Any] = _OTHER.dump_python(value, mode="json")
     return fields
@@ -53,6 +55,6 @@ def as_json(value: Scenario | OtherScenario) -> dict[str, Any]:
 
 _OTHER = TypeAdapter(OtherScenario)
 StoredScenario = Annotated[
-    Scenario | OtherScenario, PlainValidator(stored), PlainSerializer(as_json, when_used="json")
+    AnyScenario | OtherScenario, PlainValidator(stored), PlainSerializer(as_json, when_used="json")
 ]
 StoredScenarios = Annotated[tuple[StoredScenario, ...], Field(min_length=1)]

@@ -37,6 +37,7 @@ from usm_gym.support.validation import (
     validated,
 )
 from usm_gym.task.conditions import conditions_of
+from usm_gym.task.modes import AnyMode
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Mode
 
@@ -235,9 +236,9 @@ def told_with(base: str) -> str:
     return ", ".join(dict.fromkeys([*TOLD, *(each for each in known if each != POSITION_ONLY)]))
 
 
-def made_for(conditions: dict[str, Any]) -> str:
-    """The tier that these conditions of a training are, as `Contender.tuned_for` has it."""
-    tier = tier_of(conditions_of(conditions))
+def made_for(conditions: dict[str, Any], mode: AnyMode) -> str:
+    """The tier that conditions of a training in a mode are, as `Contender.tuned_for` has it."""
+    tier = tier_of(conditions_of(conditions), mode)
     return tier if tier in TIERS else ""
 
 
@@ -254,7 +255,11 @@ def agent_contender(folder: str) -> Contender:
     identity = json.dumps([agent.weights, description, sources])
     factory, told = partial(make_agent, folder=folder), told_with(agent.base)
     return Contender(
-        folder, factory, told=told, identity=identity, tuned_for=made_for(agent.conditions)
+        folder,
+        factory,
+        told=told,
+        identity=identity,
+        tuned_for=made_for(agent.conditions, agent.mode),
     )
 
 
@@ -265,7 +270,7 @@ def register_shipped() -> None:
         agent = json.loads(description.read_text(encoding="utf-8"))
         factory = partial(make_agent, folder=str(folder))
         told = told_with(agent["base"])
-        tuned_for = made_for(agent["conditions"])
+        tuned_for = made_for(agent["conditions"], agent["mode"])
         register(
             folder.name,
             factory,

@@ -24,8 +24,8 @@ from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy, is_privileged
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import PRESETS
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import Nominal, shared_nominal
-from usm_gym.task.scenario import Scenario
 from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
@@ -72,7 +72,9 @@ class ForceLog:
         return action, state
 
 
-def dissect(policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[Scenario]) -> Dissection:
+def dissect(
+    policy: ResidualPolicy, nominal: Nominal, scenarios: Sequence[AnyScenario]
+) -> Dissection:
     """Forces of base, residual and both, beside the needed one.
 
     Args:

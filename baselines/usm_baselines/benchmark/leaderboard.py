@@ -24,8 +24,8 @@ from usm_gym.suites import NAMES, suite
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import shared_nominal
-from usm_gym.task.scenario import Scenario
 
 MAIN = "operation"
 STILL = "operation, joints still"
@@ -165,7 +165,7 @@ class Place:
     job: Job
 
 
-def suites() -> dict[str, list[Scenario]]:
+def suites() -> dict[str, list[AnyScenario]]:
     """The frozen suites, and the control row: the main one with the joints still."""
     chosen = {name: suite(name) for name in NAMES}
     chosen[STILL] = [
@@ -175,9 +175,9 @@ def suites() -> dict[str, list[Scenario]]:
     return chosen
 
 
-def everyone(scenarios: Sequence[Scenario]) -> list[Contender]:
+def everyone(scenarios: Sequence[AnyScenario]) -> list[Contender]:
     """All policies that are meant for scenarios, also those on request and no competitors."""
-    return [contender(id) for id in meant_for(scenarios[0].conditions)]
+    return [contender(id) for id in meant_for(scenarios[0].conditions, scenarios[0].mode)]
 
 
 def front() -> dict[str, list[Contender]]:
@@ -196,7 +196,7 @@ def front() -> dict[str, list[Contender]]:
 def places(
     contenders: Sequence[Contender] | None,
     fronts: Mapping[str, Sequence[Contender]],
-    chosen: Mapping[str, Sequence[Scenario]],
+    chosen: Mapping[str, Sequence[AnyScenario]],
     time_limit: float = TIME_LIMIT,
 ) -> list[Place]:
     """Every policy on every suite, and the fronts on the main one.

@@ -18,8 +18,8 @@ from usm_baselines.contender import Contender
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.validation import Number, require, validated
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import shared_nominal
-from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import StoredScenarios
 
 
@@ -35,23 +35,23 @@ class Quantity:
 
     label: str
     values: tuple[float, ...]
-    vary: Callable[[Scenario, float], Scenario]
+    vary: Callable[[AnyScenario, float], AnyScenario]
 
 
-def condition(*fields: str, scale: float = 1.0) -> Callable[[Scenario, float], Scenario]:
+def condition(*fields: str, scale: float = 1.0) -> Callable[[AnyScenario, float], AnyScenario]:
     """Sets fields of the conditions, leaving water and gains as they are."""
 
-    def vary(scenario: Scenario, value: float) -> Scenario:
+    def vary(scenario: AnyScenario, value: float) -> AnyScenario:
         changed: dict[str, Any] = dict.fromkeys(fields, scale * value)
         return replace(scenario, conditions=replace(scenario.conditions, **changed))
 
     return vary
 
 
-def periods(field: str) -> Callable[[Scenario, float], Scenario]:
+def periods(field: str) -> Callable[[AnyScenario, float], AnyScenario]:
     """Sets a field of the conditions that counts control periods."""
 
-    def vary(scenario: Scenario, value: float) -> Scenario:
+    def vary(scenario: AnyScenario, value: float) -> AnyScenario:
         whole = float(value).is_integer()
         require(whole, field, value, "a whole number of control periods")
         changed: dict[str, Any] = {field: int(value)}
@@ -60,20 +60,20 @@ def periods(field: str) -> Callable[[Scenario, float], Scenario]:
     return vary
 
 
-def drawn(field: str) -> Callable[[Scenario, float], Scenario]:
+def drawn(field: str) -> Callable[[AnyScenario, float], AnyScenario]:
     """Stretches what is drawn within a limit: water, or what links differ in."""
 
-    def vary(scenario: Scenario, value: float) -> Scenario:
+    def vary(scenario: AnyScenario, value: float) -> AnyScenario:
         changed: dict[str, Any] = {field: value}
         return scenario.under(replace(scenario.conditions, **changed))
 
     return vary
 
 
-def spread(field: str) -> Callable[[Scenario, float], Scenario]:
+def spread(field: str) -> Callable[[AnyScenario, float], AnyScenario]:
     """Stretches about 1 what is drawn from a range."""
 
-    def vary(scenario: Scenario, value: float) -> Scenario:
+    def vary(scenario: AnyScenario, value: float) -> AnyScenario:
         require(0 <= value < 1, f"spread of {field}", value, "0 or more, below 1")
         changed: dict[str, Any] = {field: (1.0 - value, 1.0 + value)}
         return scenario.under(replace(scenario.conditions, **changed))
@@ -81,21 +81,17 @@ def spread(field: str) -> Callable[[Scenario, float], Scenario]:
     return vary
 
 
-def speed(scenario: Scenario, factor: float) -> Scenario:
+def speed(scenario: AnyScenario, factor: float) -> AnyScenario:
     """Filters the joint references more or less."""
-    frequency = scenario.inspection.filter_frequency
-    require(frequency is not None, "filter_frequency", frequency, "a number that can be varied")
-    motion = replace(scenario.inspection, filter_frequency=factor * (frequency or 0.0))
-    return replace(scenario, inspection=motion)
+    return scenario.bending(faster=factor)
 
 
-def amplitude(scenario: Scenario, factor: float) -> Scenario:
+def amplitude(scenario: AnyScenario, factor: float) -> AnyScenario:
     """Bends the head more or less."""
-    deflections = tuple(factor * angle for angle in scenario.inspection.deflections)
-    return replace(scenario, inspection=replace(scenario.inspection, deflections=deflections))
+    return scenario.bending(further=factor)
 
 
-def rate(scenario: Scenario, frequency: float) -> Scenario:
+def rate(scenario: AnyScenario, frequency: float) -> AnyScenario:
     """Lets the controller act more or less often; sensors keep their periods in its periods."""
     require(frequency > 0, "control rate", frequency, "more than 0 Hz")
     conditions = scenario.conditions
@@ -280,7 +276,7 @@ class RobustnessResult(Result):
 
 def jobs(
     contenders: Sequence[Contender],
-    scenarios: Sequence[Scenario],
+    scenarios: Sequence[AnyScenario],
     quantity: Quantity,
     values: Sequence[float],
     time_limit: float = TIME_LIMIT,

@@ -46,8 +46,8 @@ from usm_gym.support.validation import (
     in_one_line,
     require,
 )
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.scenario import Scenario
 from usm_gym.world import world_of
 
 # How long the code of others may think in a batch, s.
@@ -77,7 +77,7 @@ class Job:
     """
 
     contender: Contender
-    scenarios: tuple[Scenario, ...]
+    scenarios: tuple[AnyScenario, ...]
     nominal: Nominal
     time_limit: float = TIME_LIMIT
 

@@ -43,9 +43,8 @@ from usm_gym.support.seeding import TUNING, VALIDATION, stream
 from usm_gym.support.validation import UsageError, in_one_line, require
 from usm_gym.task.conditions import FIELD, LARGEST_DELAY, LARGEST_TIME_CONSTANT, Conditions
 from usm_gym.task.metrics import VARIATION_WEIGHT
+from usm_gym.task.modes import AnyMode, AnyScenario, sample_of
 from usm_gym.task.nominal import shared_nominal
-from usm_gym.task.sampling import sample
-from usm_gym.task.scenario import Mode, Scenario
 
 # Trials of a generation, and the first standard deviation of the search over the width of a range.
 GENERATION, SPREAD = 16, 0.3
@@ -73,7 +72,7 @@ class Problem:
         policy: Id of a registered policy with a declared space.
         budget: Trials and episodes.
         weight: Cost of thrust variation, mm per N/s.
-        mode: "operation" or "torpedo".
+        mode: The mode, in the plane or in space.
         conditions: Conditions of the sampled scenarios.
         seed: Seed of scenarios and search.
     """
@@ -81,7 +80,7 @@ class Problem:
     policy: str
     budget: Budget
     weight: float = VARIATION_WEIGHT
-    mode: Mode = "operation"
+    mode: AnyMode = "operation"
     conditions: Conditions = FIELD
     seed: int = 0
 
@@ -108,11 +107,11 @@ class Problem:
         text = json.dumps(parts, sort_keys=True)
         return f"{self.policy}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
-    def scenarios(self, purpose: int) -> tuple[Scenario, ...]:
+    def scenarios(self, purpose: int) -> tuple[AnyScenario, ...]:
         """Scenarios for tuning, or for the check of its result, as the policy is told of them."""
         require(purpose in (TUNING, VALIDATION), "purpose", purpose, "TUNING or VALIDATION")
         return tuple(
-            sample(self.mode, self.conditions, stream(self.seed, purpose, episode))
+            sample_of(self.mode, self.conditions, stream(self.seed, purpose, episode))
             for episode in range(self.budget.episodes)
         )
 
@@ -146,7 +145,7 @@ class Optimum:
     validation: float
 
 
-def later(scenario: Scenario, periods: int, lag: float) -> Scenario:
+def later(scenario: AnyScenario, periods: int, lag: float) -> AnyScenario:
     """The same scenario, with commands some periods later and a lag longer by a factor."""
     conditions = scenario.conditions
     changed = replace(

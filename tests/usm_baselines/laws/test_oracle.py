@@ -65,7 +65,7 @@ def test_alone_and_side_by_side_the_bits_are_the_same(limit: float) -> None:
 
 def test_is_no_competitor_and_wants_the_truth() -> None:
     episodes = scenarios("field", 1)
-    assert "oracle" not in [each.name for each in chosen_contenders(None, PRESETS["field"])]
+    assert "oracle" not in [each.name for each in chosen_contenders(None, episodes[0])]
     policy: Any = usm_baselines.make("oracle", episodes[0].nominal)
     assert policy.privileged
     with pytest.raises(ValueError, match="snapshot is None; allowed: the true state"):
