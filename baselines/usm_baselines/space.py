@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from usm_gym.support.validation import require
+from usm_gym.task.modes import in_space
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,9 @@ class Range:
 
 
 Space = Mapping[str, Range]
+# Where gains are looked for in space, if elsewhere than in the plane: what noise an observer makes
+# has to move 86 kg there.
+SPATIAL_RANGES = {"observer_gain": Range(1e-4, 100.0, "m/s^3")}
 
 
 class Gain(float):
@@ -92,6 +96,12 @@ class Gain(float):
 def declared(gains: type[Any]) -> dict[str, Gain]:
     """The declarations in a `NamedTuple` of gains, by name."""
     return {name: gains._field_defaults[name] for name in gains._fields}
+
+
+def in_mode(space: Space, mode: str) -> Space:
+    """The space in which the gains of a law are tuned in a mode, in the plane or in space."""
+    others = SPATIAL_RANGES if in_space(mode) else {}
+    return {name: others.get(name, span) for name, span in space.items()}
 
 
 def space_of(gains: type[Any], **others: Range) -> Space:

@@ -35,7 +35,7 @@ from usm_baselines.benchmark.scoring import Job, Refusal, score_all, score_batch
 from usm_baselines.contender import registered
 from usm_baselines.gains import Budget, GainsFile
 from usm_baselines.registry import entry, tuned
-from usm_baselines.space import Space
+from usm_baselines.space import Space, in_mode
 from usm_gym.evaluation import Evaluation
 from usm_gym.support import parallel
 from usm_gym.support.files import holding
@@ -95,7 +95,7 @@ class Problem:
     @property
     def space(self) -> Space:
         """The declared space of the gains."""
-        return entry(self.policy).space
+        return in_mode(entry(self.policy).space, self.mode)
 
     @property
     def study(self) -> str:
