@@ -5,11 +5,13 @@ from __future__ import annotations
 from importlib import resources
 from typing import Any
 
-# Away meanwhile, as they are many and like those before: rows of a table beyond the third, and the
-# insides of formulas, which have the colour of the text around them.
+# Away meanwhile, as they are many: rows of a table beyond the third, which are like those before;
+# the insides of formulas, which have the colour of the text around them; shapes without text.
 RUN = """
 const done = arguments[arguments.length - 1];
-const away = [...document.querySelectorAll("tbody > tr:nth-child(n + 4), math > *")];
+const away = [...document.querySelectorAll(
+  "tbody > tr:nth-child(n + 4), math > *, svg path, svg use, svg defs, svg g:not(:has(text, title))"
+)];
 const places = away.map((element) => [element.parentNode, element]);
 away.forEach((element) => element.remove());
 const end = (said) => {
