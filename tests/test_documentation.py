@@ -6,7 +6,6 @@ import shlex
 import shutil
 import sys
 import tomllib
-from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -161,7 +160,7 @@ def site(tmp_path_factory):
     """The folder of the site, whose figures have a short episode."""
     commands = pytest.importorskip("mkdocs.commands.build")
     pages, made = tmp_path_factory.mktemp("pages"), tmp_path_factory.mktemp("site")
-    short = [replace(usm_gym.suite("operation")[0], duration=10.0)]
+    short = [brief(usm_gym.suite("operation")[0])]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(usm_gym, "suite", lambda name: short)
         prepare = runpy.run_path(str(ROOT / "docs" / "prepare"))["prepare"]
