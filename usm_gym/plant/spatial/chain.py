@@ -309,51 +309,46 @@ def substitute(block, like, i, j, distance, plant, motion):
 @piece
 def inward(block, like, plant):
     """Eliminate both halves; returns the answer of the whole at the root's middle."""
-    links, root = plant.links, plant.root
-    last, zero = links - 1, (like, like, like)
+    root, zero = plant.root, (like, like, like)
     zeros = (like, like, like, like, like, like)
-    tail = (zeros, (like, like, like, like, like, like, like, like, like), zeros, zero, zero)
-    head = tail
-    half = scalar(plant, HALF, root)
-    for k in range(last - root):
-        inner = k + 1
-        distance = -half if inner == root else -2.0 * scalar(plant, REACH, inner)
-        tail = eliminate(block, like, k, k, distance, plant, tail)
-        inner = last - k - 1
-        distance = half if inner == root else -2.0 * scalar(plant, REACH, inner)
-        head = eliminate(block, like, last - k, inner, distance, plant, head)
-    if 2 * root == links:
-        tail = eliminate(block, like, root - 1, root - 1, -half, plant, tail)
-    J, H, M, n, f = with_own(block, like, root, plant, tail)
-    J_h, H_h, M_h, n_h, f_h = head
-    J = (
-        J[0] + J_h[0],
-        J[1] + J_h[1],
-        J[2] + J_h[2],
-        J[3] + J_h[3],
-        J[4] + J_h[4],
-        J[5] + J_h[5],
+    none = (zeros, (like, like, like, like, like, like, like, like, like), zeros, zero, zero)
+    whole = with_own(block, like, root, plant, none)
+    for side in range(2):
+        answer, way = none, 1 - 2 * side
+        i = side * (plant.links - 1)
+        while i != root:
+            inner = i + way
+            distance = -2.0 * scalar(plant, REACH, inner)
+            if inner == root:
+                distance = -way * scalar(plant, HALF, root)
+            answer = eliminate(block, like, i, i - side, distance, plant, answer)
+            i = inner
+        whole = together(whole, answer)
+    return whole
+
+
+@piece
+def together(one, other):
+    """The sum of two answers."""
+    J, H, M, n, f = one
+    j, h, m, p, q = other
+    return (
+        (J[0] + j[0], J[1] + j[1], J[2] + j[2], J[3] + j[3], J[4] + j[4], J[5] + j[5]),
+        (
+            H[0] + h[0],
+            H[1] + h[1],
+            H[2] + h[2],
+            H[3] + h[3],
+            H[4] + h[4],
+            H[5] + h[5],
+            H[6] + h[6],
+            H[7] + h[7],
+            H[8] + h[8],
+        ),
+        (M[0] + m[0], M[1] + m[1], M[2] + m[2], M[3] + m[3], M[4] + m[4], M[5] + m[5]),
+        plus(n, p),
+        plus(f, q),
     )
-    M = (
-        M[0] + M_h[0],
-        M[1] + M_h[1],
-        M[2] + M_h[2],
-        M[3] + M_h[3],
-        M[4] + M_h[4],
-        M[5] + M_h[5],
-    )
-    H = (
-        H[0] + H_h[0],
-        H[1] + H_h[1],
-        H[2] + H_h[2],
-        H[3] + H_h[3],
-        H[4] + H_h[4],
-        H[5] + H_h[5],
-        H[6] + H_h[6],
-        H[7] + H_h[7],
-        H[8] + H_h[8],
-    )
-    return J, H, M, plus(n, n_h), plus(f, f_h)
 
 
 @piece
@@ -364,25 +359,19 @@ def accelerate(block, like, wide, stride, axes, plant):
     """
     links, root = plant.links, plant.root
     own_answers(block, like, wide, stride, plant)
-    tail = solve_root(inward(block, like, plant))
-    head = tail
-    keep_accelerations(block, like, root, plant, tail[0], tail[1])
-    store_base(block, DW, tail[0])
+    alpha, a = solve_root(inward(block, like, plant))
+    keep_accelerations(block, like, root, plant, alpha, a)
+    store_base(block, DW, alpha)
     through = load_vector(block, VELOCITY, root, links, like)
     turning = cross(load_vector(block, OMEGA, root, links, like), through)
-    relative = out_of(axes, plus(tail[1], turning))
+    relative = out_of(axes, plus(a, turning))
     store_base(block, A, plus(relative, load_base(block, WATER_A, like)))
-    half = scalar(plant, HALF, root)
-    behind, before = -half, half
-    for k in range(links - 1 - root):
-        i = root - 1 - k
-        tail = substitute(block, like, i, i, behind, plant, tail)
-        behind = -scalar(plant, REACH, i)
-        i = root + 1 + k
-        head = substitute(block, like, i, i - 1, before, plant, head)
-        before = -scalar(plant, REACH, i)
-    if 2 * root == links:
-        substitute(block, like, 0, 0, behind, plant, tail)
+    for side in range(2):
+        motion, way = (alpha, a), 2 * side - 1
+        distance, i = way * scalar(plant, HALF, root), root + way
+        while 0 <= i < links:
+            motion = substitute(block, like, i, i - side, distance, plant, motion)
+            distance, i = -scalar(plant, REACH, i), i + way
 
 
 @compiled

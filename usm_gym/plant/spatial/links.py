@@ -221,20 +221,14 @@ def kinematics(block, like, wide, stride, plant):
     joint_motion(block, wide, stride, plant)
     axes, (omega, v, g) = root_motion(block, like, plant)
     still = (like, like, like)
-    tail = (omega, v, g, still, still)
-    head = tail
-    store_motion(block, root, links, tail)
-    half = scalar(plant, HALF, root)
-    behind, before = -half, half
-    for k in range(links - 1 - root):
-        i = root - 1 - k
-        tail = outward(block, like, i, i, behind, plant, tail)
-        behind = -scalar(plant, REACH, i)
-        i = root + 1 + k
-        head = outward(block, like, i - 1, i, before, plant, head)
-        before = -scalar(plant, REACH, i)
-    if 2 * root == links:
-        outward(block, like, 0, 0, behind, plant, tail)
+    start = (omega, v, g, still, still)
+    store_motion(block, root, links, start)
+    for side in range(2):
+        motion, way = start, 2 * side - 1
+        distance, i = way * scalar(plant, HALF, root), root + way
+        while 0 <= i < links:
+            motion = outward(block, like, i - side, i, distance, plant, motion)
+            distance, i = -scalar(plant, REACH, i), i + way
     return axes
 
 
