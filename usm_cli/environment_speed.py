@@ -7,16 +7,14 @@ from typing import Any
 import gymnasium as gym
 from usm_baselines.registry import make
 
-from usm_cli.speed import Timing, resting
-from usm_gym.robot import Robot
-from usm_gym.task.conditions import Conditions
+from usm_cli.speed import Timing, resting, still_water
 
-OPERATION = "usm_gym:USM-Operation-v0"
+OPERATION, OPERATION_3D = "usm_gym:USM-Operation-v0", "usm_gym:USM-Operation3D-v0"
 
 
 def single_timing(name: str, steps: int) -> Timing:
     """Time steps of one robot in the environment that `gym.make` makes, random thrust."""
-    scenario = resting(1, Conditions(current_limit=0.0), Robot())[0]
+    scenario = resting(1, still_water("operation"))[0]
     return _loop(name, gym.make(OPERATION), steps, 1, {"scenario": scenario})
 
 
@@ -45,7 +43,14 @@ def vector_timing(name: str, size: int, steps: int, threads: int = 1) -> Timing:
     `start_timing` times the starts of episodes, whose number depends on the policy.
     """
     envs = _vector_env(size, threads=threads)
-    options = {"scenario": resting(size, Conditions(current_limit=0.0), Robot())}
+    options = {"scenario": resting(size, still_water("operation"))}
+    return _loop(name, envs, steps, size, options)
+
+
+def spatial_vector_timing(name: str, size: int, steps: int) -> Timing:
+    """Time the same of the vector environment in space."""
+    envs = _vector_env(size, OPERATION_3D)
+    options = {"scenario": resting(size, still_water("operation3d"), mode="operation3d")}
     return _loop(name, envs, steps, size, options)
 
 
@@ -91,10 +96,8 @@ def swimmer_timing(name: str, steps: int) -> Timing:
     return _loop(name, gym.make("Swimmer-v5"), steps, 1)
 
 
-def _vector_env(size: int, **options: Any) -> Any:
-    return gym.make_vec(
-        OPERATION, num_envs=size, vectorization_mode="vector_entry_point", **options
-    )
+def _vector_env(size: int, id: str = OPERATION, **options: Any) -> Any:
+    return gym.make_vec(id, num_envs=size, vectorization_mode="vector_entry_point", **options)
 
 
 def _loop(

@@ -25,13 +25,13 @@ from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import Count, Number, require, validated
 from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.modes import AnyMode, AnyScenario, presets_of, sample_of
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import Path as Track
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.spatial_scenario import SpatialPath, SpatialScenario
 
 ROBOTS = 256
 SINGLE_PERIOD, BATCH_PERIOD = 1.0, 0.1
-HERE = Track(speed=0.0, amplitude=0.0)
 # Physics steps that are priced, s; the last is what the others are compared with.
 STEPS = {"2ms": 2e-3, "1ms": 1e-3, "500us": 5e-4, "100us": 1e-4}
 LOOPS, LOOP_TIME = 8, 15.0
@@ -167,16 +167,16 @@ def plant_timing(
     threads: int = 1,
     robot: Robot | None = None,
     step: float = FIELD.physics_step,
+    mode: AnyMode = "operation",
 ) -> Timing:
     """Time physics steps of `size` robots, per robot and step, with moving joints.
 
     They have no thrust, so their reference rests; otherwise they would be lost.
     """
-    body = robot or Robot()
-    conditions = Conditions(control_period=period, physics_step=step, current_limit=0.0)
-    simulation = Simulation(resting(size, conditions, body), threads)
+    conditions = replace(still_water(mode), control_period=period, physics_step=step)
+    simulation = Simulation(resting(size, conditions, robot, mode), threads)
     start = simulation.snapshot()
-    action = np.zeros((size, len(body.thrusters)), np.float32)
+    action = np.zeros((size, simulation.world.thrusters), np.float32)
 
     def run() -> None:
         if simulation.count[0] == simulation.steps[0]:
@@ -192,50 +192,27 @@ def second_timing(name: str, step: float) -> Timing:
     return replace(steps, units=ROBOTS * BATCH_PERIOD, scale=1e6)
 
 
-def resting(size: int, conditions: Conditions, robot: Robot) -> list[Scenario]:
+def still_water(mode: AnyMode) -> Conditions:
+    """The conditions `field` of a mode, without a current."""
+    return replace(presets_of(mode)["field"], current_limit=0.0)
+
+
+def resting(
+    size: int, conditions: Conditions, robot: Robot | None = None, mode: AnyMode = "operation"
+) -> list[AnyScenario]:
     """Sample scenarios with a resting reference, so that no controller is needed."""
     scenarios = [
-        replace(
-            sample("operation", conditions, stream(0, EVALUATION, i), robot),
-            path=HERE,
-        )
+        at_rest(sample_of(mode, conditions, stream(0, EVALUATION, i), robot))
         for i in range(min(size, 64))
     ]
     return [scenarios[i % len(scenarios)] for i in range(size)]
 
 
-def mujoco_timing(name: str, steps: int) -> Timing:
-    """Time MuJoCo's C loop, Euler, on the same chain in ellipsoid fluid, if it is installed."""
-    import mujoco
-    from mujoco import rollout
-
-    model = mujoco.MjModel.from_xml_string(mujoco_chain(Robot()))
-    data = mujoco.MjData(model)
-    data.qvel[:] = 0.1 * np.random.default_rng(0).standard_normal(model.nv)
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    state = np.zeros((1, mujoco.mj_stateSize(model, kind)))
-    mujoco.mj_getState(model, data, state[0], kind)
-    return Timing(name, lambda: rollout.rollout(model, data, state, nstep=steps), steps)
-
-
-def mujoco_chain(robot: Robot) -> str:
-    """Write the robot without thrusters as a MuJoCo model."""
-    half = robot.half_length
-    geom = (
-        f'<geom type="ellipsoid" size="{half} {robot.half_height} {robot.half_width}" '
-        f'mass="{robot.link_mass}" fluidshape="ellipsoid" contype="0" conaffinity="0"/>'
-    )
-    joint = (
-        f'<joint axis="0 0 1" pos="{-half} 0 0" stiffness="{robot.joint_stiffness}" '
-        f'damping="{robot.joint_damping}"/>'
-    )
-    bodies = ""
-    for _ in range(robot.links - 1):
-        bodies = f'<body pos="{2 * half} 0 0">{joint}{geom}{bodies}</body>'
-    root = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint/>'
-    option = f'<option timestep="0.001" gravity="0 0 0" density="{robot.water_density}"/>'
-    world = f"<worldbody><body>{root}{geom}{bodies}</body></worldbody>"
-    return f"<mujoco>{option}{world}</mujoco>"
+def at_rest(scenario: AnyScenario) -> AnyScenario:
+    """A scenario whose reference stays where it starts."""
+    if isinstance(scenario, SpatialScenario):
+        return replace(scenario, path=SpatialPath(speed=0.0, sway=0.0, heave=0.0))
+    return replace(scenario, path=Track(speed=0.0, amplitude=0.0))
 
 
 def paper_rate() -> None:
@@ -245,9 +222,9 @@ def paper_rate() -> None:
     simulate(replace(scenario, conditions=conditions), Law())
 
 
-def evaluate_suite() -> None:
-    """Score six policies on the operation suite."""
-    scenarios = suite("operation")
+def evaluate_suite(name: str) -> None:
+    """Score six policies on a suite."""
+    scenarios = suite(name)
     nominal = scenarios[0].nominal
     for id in ("sta", "sta-explicit", "pd", "pd-mass", "pd-observer", "zero"):
         evaluate(make(id, nominal), scenarios)

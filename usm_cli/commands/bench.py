@@ -13,6 +13,7 @@ from rich.table import Table
 from usm_cli import environment_speed as environments
 from usm_cli import speed as benchmark
 from usm_cli.decisions import decision_times, policies
+from usm_cli.mujoco_chains import mujoco_timing, planar_chain, spatial_chain
 from usm_cli.speed import (
     BATCH_PERIOD,
     ROBOTS,
@@ -22,9 +23,12 @@ from usm_cli.speed import (
     Growth,
     SpeedResult,
     Timing,
+    evaluate_suite,
     summarise,
 )
 from usm_cli.terminal import empty_table, output_console, progress_bar
+from usm_gym.robot import Robot
+from usm_gym.spatial_robot import EELY
 from usm_gym.support.files import check_writable
 from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures
@@ -42,6 +46,8 @@ Takes some minutes; let the machine do nothing else meanwhile.
 PEERS = {
     "plant_step_ratio_mujoco": ("mujoco_step_ns", "plant_step_ns"),
     "batch_step_ratio_mujoco": ("mujoco_step_ns", "batch_step_ns"),
+    "spatial_step_ratio_mujoco": ("spatial_mujoco_step_ns", "spatial_step_ns"),
+    "spatial_batch_step_ratio_mujoco": ("spatial_mujoco_step_ns", "spatial_batch_step_ns"),
     "vector_env_ratio_swimmer_v5": ("swimmer_v5_step_ns", "vector_env_step_ns"),
     "vector_env_ratio_sync": ("sync_vector_env_step_ns", "vector_env_step_ns"),
     "vector_env_ratio_cartpole": ("cartpole_vector_env_step_ns", "vector_env_step_ns"),
@@ -68,15 +74,22 @@ MEANINGS = {
     "plant_step_ns": "physics step of one robot, ns",
     "batch_step_ns": f"physics step, {ROBOTS} robots, one thread, per robot, ns",
     "mujoco_step_ns": "MuJoCo, C loop, Euler, the same chain, ns",
+    "spatial_step_ns": "physics step of one robot in space (Eely, 9 links), ns",
+    "spatial_batch_step_ns": f"the same, {ROBOTS} robots, one thread, per robot, ns",
+    "spatial_mujoco_step_ns": "MuJoCo, C loop, Euler, the same chain in space, ns",
+    "spatial_mujoco_implicitfast_step_ns": "the same with the integrator implicitfast, ns",
     "vector_env_step_ns": f"environment step, {ROBOTS} robots, one thread, per robot, ns",
     "vector_env_policy_step_ns": f"the same with the policy {POLICY}, ns",
     "vector_env_two_threads_step_ns": f"environment step, {ROBOTS} robots, on two threads, ns",
+    "spatial_vector_env_step_ns": f"the same in space, {ROBOTS} robots, one thread, ns",
     "episode_start_us": "start of an episode in the vector environment, us",
     "sync_vector_env_step_ns": "SyncVectorEnv of 8 of our environments, per robot, ns",
     "swimmer_v5_step_ns": "Gymnasium's Swimmer-v5, ns",
     "cartpole_vector_env_step_ns": f"Gymnasium's CartPole vector environment, {ROBOTS}, ns",
     "plant_step_ratio_mujoco": "MuJoCo / physics step of one robot",
     "batch_step_ratio_mujoco": "MuJoCo / physics step in a batch",
+    "spatial_step_ratio_mujoco": "MuJoCo, Euler / physics step of one robot in space",
+    "spatial_batch_step_ratio_mujoco": "MuJoCo, Euler / physics step in a batch in space",
     "vector_env_ratio_swimmer_v5": "Swimmer-v5 / environment step (20 physics steps)",
     "vector_env_ratio_sync": "SyncVectorEnv / native vector environment",
     "vector_env_ratio_cartpole": "CartPole vector environment / ours",
@@ -91,6 +104,7 @@ MEANINGS = {
     },
     "paper_rate_40s_s": "40 s at 1e-5 s with observer and STA, s",
     "evaluate_suite_s": "operation suite, six policies, s",
+    "evaluate_suite_3d_s": "operation3d suite, six policies, s",
     "thousand_episodes_s": "1000 operation episodes of 40 s with sta, s",
     "cold_start_s": "start of Python to first step, warm kernel cache, s",
     "compile_s": "the same with an empty cache, s",
@@ -165,7 +179,22 @@ def available() -> tuple[list[Timing], list[str]]:
     makers: dict[str, Callable[[str], Timing]] = {
         "plant_step_ns": lambda name: benchmark.plant_timing(name, 1, SINGLE_PERIOD),
         "batch_step_ns": lambda name: benchmark.plant_timing(name, ROBOTS, BATCH_PERIOD),
-        "mujoco_step_ns": lambda name: benchmark.mujoco_timing(name, 2000),
+        "mujoco_step_ns": lambda name: mujoco_timing(name, 2000, planar_chain(Robot())),
+        "spatial_step_ns": partial(
+            benchmark.plant_timing, size=1, period=SINGLE_PERIOD, mode="operation3d"
+        ),
+        "spatial_batch_step_ns": partial(
+            benchmark.plant_timing, size=ROBOTS, period=BATCH_PERIOD, mode="operation3d"
+        ),
+        "spatial_mujoco_step_ns": lambda name: mujoco_timing(
+            name, 2000, spatial_chain(EELY, "Euler")
+        ),
+        "spatial_mujoco_implicitfast_step_ns": lambda name: mujoco_timing(
+            name, 300, spatial_chain(EELY, "implicitfast")
+        ),
+        "spatial_vector_env_step_ns": partial(
+            environments.spatial_vector_timing, size=ROBOTS, steps=50
+        ),
         "env_step_ns": partial(environments.single_timing, steps=500),
         "env_policy_step_ns": partial(environments.swimming_timing, id=POLICY, steps=500),
         "vector_env_step_ns": partial(environments.vector_timing, size=ROBOTS, steps=100),
@@ -200,7 +229,11 @@ def whole_jobs() -> dict[str, tuple[Callable[[], float], int]]:
     benchmark.paper_rate()  # compiles what is not yet compiled
     return {
         "paper_rate_40s_s": (lambda: benchmark.timed(benchmark.paper_rate), 3),
-        "evaluate_suite_s": (lambda: benchmark.timed(benchmark.evaluate_suite), 3),
+        "evaluate_suite_s": (lambda: benchmark.timed(partial(evaluate_suite, "operation")), 3),
+        "evaluate_suite_3d_s": (
+            lambda: benchmark.timed(partial(evaluate_suite, "operation3d")),
+            3,
+        ),
         "thousand_episodes_s": (lambda: benchmark.timed(benchmark.thousand_episodes), 1),
         "cold_start_s": (lambda: benchmark.first_step(compile_anew=False), 5),
         "compile_s": (lambda: benchmark.first_step(compile_anew=True), 1),
