@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.plant import layout as rows
+from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import real_array, require
 from usm_gym.task.conditions import FIELD, Conditions
@@ -105,6 +106,8 @@ def linearise(
         ValueError: If an argument is of the wrong kind or shape, or not finite.
     """
     require(isinstance(nominal, Nominal), "nominal", nominal, "a Nominal, as environments have it")
+    planar = isinstance(nominal.robot, Robot)
+    require(planar, "the nominal robot", nominal.robot, "a planar one")
     links, thrusters = nominal.robot.links, len(nominal.robot.thrusters)
     straight = np.zeros(links - 1)
     angles = straight if joint_angles is None else _finite("joint_angles", joint_angles)

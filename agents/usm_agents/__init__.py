@@ -8,13 +8,14 @@ import gymnasium as gym
 
 from usm_agents.artifact.folder import register_shipped
 from usm_agents.residual.task import ResidualPolicy
+from usm_gym.registration import id_of
 from usm_gym.task.scenario import MODES
 
 __all__ = ["ResidualPolicy"]
 
 for _mode in MODES:
     gym.register(
-        id=f"USM-{_mode.capitalize()}Residual-v0",
+        id=id_of(_mode, "Residual"),
         entry_point="usm_agents.residual.env:make_residual_env",
         vector_entry_point="usm_agents.residual.env:make_residual_vector_env",
         kwargs={"mode": _mode},

@@ -19,8 +19,8 @@ from usm_gym.envs.env import TrackingEnv
 from usm_gym.evaluation import batches
 from usm_gym.support.provenance import provenance
 from usm_gym.support.validation import UsageError, in_one_line
-from usm_gym.task.conditions import FIELD, PRESETS
-from usm_gym.task.scenario import MODES
+from usm_gym.task.conditions import PRESETS
+from usm_gym.task.modes import ALL_MODES
 
 DESCRIPTION = """\
 Write the episodes of a policy as a dataset of Minari, for offline learning: observations, actions,
@@ -49,7 +49,7 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     add("policy", metavar="POLICY", help="name of a policy")
     add("--episodes", type=int, metavar="N", help="number of episodes (default: 50)")
-    add("--mode", choices=MODES, default="operation", help="default: operation")
+    add("--mode", choices=ALL_MODES, default="operation", help="default: operation")
     add("--conditions", metavar="C", help=f"{', '.join(PRESETS)}, or JSON (default: field)")
     add("--seed", type=int, metavar="S", help="seed of the scenarios (default: 0)")
     add("--output", metavar="ID", required=True, help="id of the dataset: NAMESPACE/NAME-vN")
@@ -60,10 +60,8 @@ def run(arguments: argparse.Namespace) -> None:
     """Record, write, print where it is."""
     check_installed("usm record", "datasets", "minari", "h5py")
     episodes, seed = count(arguments, "episodes", 50), count(arguments, "seed", 0, least=0)
-    given = arguments.conditions
-    conditions = FIELD if given is None else parse_conditions(given)
-    task = f"usm_gym:USM-{arguments.mode.capitalize()}-v0"
-    made = gym.make(task, conditions=asdict(conditions))
+    conditions = parse_conditions(arguments.conditions or "field", arguments.mode)
+    made = gym.make(f"usm_gym:{id_of(arguments.mode)}", conditions=asdict(conditions))
     env = cast(TrackingEnv, made.unwrapped)
     contender = named(arguments.policy)
     contender.make(env.nominal)
