@@ -17,6 +17,7 @@ from usm_cli.terminal import output_console, progress_bar
 from usm_gym.dataset import new_dataset, record, reset_seeds
 from usm_gym.envs.env import TrackingEnv
 from usm_gym.evaluation import batches
+from usm_gym.registration import id_of
 from usm_gym.support.provenance import provenance
 from usm_gym.support.validation import UsageError, in_one_line
 from usm_gym.task.conditions import PRESETS
