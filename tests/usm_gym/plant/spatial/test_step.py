@@ -257,7 +257,6 @@ def test_drag_takes_energy_in_every_step() -> None:
 
 def test_without_drag_energy_changes_by_the_error_of_the_step_alone() -> None:
     changes = [np.abs(np.diff(energies(without_drag(EELY), h))).sum() for h in (2e-3, 1e-3, 5e-4)]
-    assert changes[0] < 1e-3 * energies(EELY, 1e-3)[0]
     np.testing.assert_allclose(np.log2(np.divide(changes[:-1], changes[1:])), 2.0, atol=0.2)
 
 
