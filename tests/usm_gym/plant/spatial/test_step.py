@@ -79,7 +79,7 @@ def turning(robot: SpatialRobot, seed: int = 0, **changes: Array) -> Moment:
 
 
 # A smooth episode of everything that moves a robot of uneven links and axes.
-CHAIN = replace(random_chain(4), joint_stiffness=50.0, joint_damping=10.0)
+CHAIN = replace(random_chain(4), joint_stiffness=10.0, joint_damping=2.0)
 SHIFT, END = 0.1, 0.3  # s
 BEND = Episode(
     step=1e-3,
@@ -135,7 +135,7 @@ def exact_bend() -> tuple[Array, Array, Array]:
 
     y = np.concatenate(parts)
     for span in ((0.0, SHIFT), (SHIFT, END)):  # the reference has a corner there
-        y = solve_ivp(derivative, span, y, method="DOP853", rtol=1e-9, atol=1e-12).y[:, -1]
+        y = solve_ivp(derivative, span, y, method="DOP853", rtol=1e-8, atol=1e-11).y[:, -1]
     position, quaternion, angles, *_ = np.split(y, ends)
     return position, quaternion / np.linalg.norm(quaternion), angles
 
@@ -170,9 +170,10 @@ def fastest(step: float, gains: tuple[float, float]) -> float:
 
 @pytest.mark.parametrize("gains", [(1e3, 200.0), (9e3, 1500.0), (1e5, 1e4)])
 def test_stiff_joints_are_stable_at_coarse_steps(gains: tuple[float, float]) -> None:
+    usual = fastest(1e-3, gains)
     for step in (5e-3, 1e-2, 2e-2):
         # Control instants miss more of how the joints spring at a jump, the finer the step.
-        assert fastest(step, gains) < 3.0 * fastest(1e-3, gains)
+        assert fastest(step, gains) < 2.0 * usual
 
 
 def test_the_quaternion_keeps_its_length() -> None:
