@@ -1,5 +1,6 @@
 """The elementary functions are right to the last bit or nearly, and the same however evaluated."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -32,6 +33,14 @@ def sines_in_lanes(blocks: Array) -> None:
         s, c = sincos(load(block, 0, like))
         store(block, 1, s)
         store(block, 2, c)
+
+
+@numba.njit
+def square_roots_in_lanes(blocks: Array) -> None:
+    like = spread(0.0)
+    for k in range(blocks.shape[0]):
+        block = block_at(blocks, k, like)
+        store(block, 1, math.sqrt(load(block, 0, like)))
 
 
 @numba.njit
@@ -146,6 +155,15 @@ def test_lanes_have_the_bits_of_single_numbers() -> None:
     s, c = sine_and_cosine(x.ravel())
     assert np.array_equal(blocks[:, 1].ravel(), s)
     assert np.array_equal(blocks[:, 2].ravel(), c)
+
+
+def test_square_roots_in_lanes_are_rounded_as_ieee_754_has_it() -> None:
+    x = magnitudes(5e-324, 1e308, 80 * WIDTH, 8).reshape(-1, WIDTH)
+    x[0, 0], x[0, 1], x[1] = 0.0, 5e-324, np.nextafter(1.0, 0.0)
+    blocks = np.zeros((len(x), 2, WIDTH))
+    blocks[:, 0] = x
+    square_roots_in_lanes(blocks.reshape(len(x), -1))
+    assert np.array_equal(blocks[:, 1], np.sqrt(x))
 
 
 def test_machine_code_has_the_bits_of_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,7 +59,7 @@ def with_own(block, like, i, plant, answer):
 
 @piece
 def moved(d, answer):
-    """An answer at the point d further back along x, where it was given."""
+    """An answer, given at a point, at the point that lies d further back along x."""
     J, H, M, n, f = answer
     y = H[3] - d * M[2], H[4] - d * M[4], H[5] - d * M[5]
     z = H[6] + d * M[1], H[7] + d * M[3], H[8] + d * M[4]
