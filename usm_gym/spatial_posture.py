@@ -21,7 +21,7 @@ def link_poses(
             frame, m, (..., 3).
         quaternion: Attitude of the root (w, x, y, z), from its axes to the global ones, of any
             length but 0, (..., 4).
-        joint_angles: Angle by which each joint turns the link before it, right-handed about its
+        joint_angles: Angle by which each joint turns the link after it, right-handed about its
             axis, rad, (..., joints).
 
     Returns:

@@ -37,16 +37,12 @@ def parallel(function: F) -> F:
 
 def piece(function: F) -> F:
     """Compile a part of kernels, for use within `compiled` functions only."""
-    notice(function)
-    part: F = numba.njit(fastmath=FLAGS, error_model="numpy", forceinline=True)(function)
-    return part
+    return _part(function, forceinline=True)
 
 
 def aside(function: F) -> F:
     """Compile a part of kernels that is seldom run: it is called, where a `piece` is inlined."""
-    notice(function)
-    part: F = numba.njit(fastmath=FLAGS, error_model="numpy")(function)
-    return part
+    return _part(function)
 
 
 def shared(function: F) -> F:
@@ -54,6 +50,15 @@ def shared(function: F) -> F:
     notice(function)
     kept: F = numba.extending.register_jitable(function)
     return kept
+
+
+def _part(function: F, **options: Any) -> F:
+    notice(function)
+    # Only kernels call it, so it needs no entry for anybody else; these take long to compile.
+    alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    usual = {"fastmath": FLAGS, "error_model": "numpy"}
+    part: F = numba.njit(**usual | alone | options)(function)
+    return part
 
 
 def _kernel(function: F, **options: Any) -> F:

@@ -285,6 +285,34 @@ def later(v, lead, a, b):
 
 
 @piece
+def inertia(block, like, wide, stride, plant, i):
+    """Of link i with its water: mass along and across, first moment, inertia about x, y, z."""
+    factor = load(block, row_of(FACTOR, plant.links) + i, wide)
+    across = factor * load(block, ADDED_ACROSS, like)
+    mass = constant(plant, MASS, i, wide, stride)
+    water = constant(plant, ADDED_MASS, i, wide, stride)
+    added = across * constant(plant, ADDED_INERTIA, i, wide, stride)
+    return (
+        mass + factor * load(block, ADDED_ALONG, like) * water,
+        mass + across * water,
+        constant(plant, FIRST_MOMENT, i, wide, stride),
+        constant(plant, INERTIA_X, i, wide, stride),
+        constant(plant, INERTIA_Y, i, wide, stride) + added,
+        constant(plant, INERTIA_Z, i, wide, stride) + added,
+    )
+
+
+@piece
+def momenta(body, omega, v):
+    """Momentum and angular momentum about the middle, `body` being what `inertia` returns."""
+    m_x, m_y, s, J_x, J_y, J_z = body
+    return (
+        (m_x * v[0] + s * omega[1], m_y * v[1] - s * omega[0], m_y * v[2]),
+        (J_x * omega[0] - s * v[1], J_y * omega[1] + s * v[0], J_z * omega[2]),
+    )
+
+
+@piece
 def own_answer(block, like, wide, stride, plant, i):
     """The answer of link i; see `own_answers`.
 
@@ -298,22 +326,11 @@ def own_answer(block, like, wide, stride, plant, i):
     d_alpha = load_vector(block, BIAS_ALPHA, i, links, wide)
     d_a = load_vector(block, BIAS, i, links, wide)
     along, turning, k_0, k_1, k_2 = drag(block, like, wide, stride, plant, i, omega, v)
-    factor = load(block, row_of(FACTOR, links) + i, wide)
-    by_across = factor * load(block, ADDED_ACROSS, like)
-    mass = constant(plant, MASS, i, wide, stride)
-    water = constant(plant, ADDED_MASS, i, wide, stride)
-    m_x = mass + factor * load(block, ADDED_ALONG, like) * water
-    m_y = mass + by_across * water
-    s = constant(plant, FIRST_MOMENT, i, wide, stride)
-    added = by_across * constant(plant, ADDED_INERTIA, i, wide, stride)
-    J_x = constant(plant, INERTIA_X, i, wide, stride)
-    J_y = constant(plant, INERTIA_Y, i, wide, stride) + added
-    J_z = constant(plant, INERTIA_Z, i, wide, stride) + added
-    # Momentum p and angular momentum h about the middle, and what they change by on their own.
-    p = m_x * v[0] + s * omega[1], m_y * v[1] - s * omega[0], m_y * v[2]
-    h = J_x * omega[0] - s * v[1], J_y * omega[1] + s * v[0], J_z * omega[2]
-    p_dot = m_x * d_a[0] + s * d_alpha[1], m_y * d_a[1] - s * d_alpha[0], m_y * d_a[2]
-    h_dot = J_x * d_alpha[0] - s * d_a[1], J_y * d_alpha[1] + s * d_a[0], J_z * d_alpha[2]
+    body = inertia(block, like, wide, stride, plant, i)
+    m_x, m_y, s, J_x, J_y, J_z = body
+    # By what the momenta change on their own.
+    p, h = momenta(body, omega, v)
+    p_dot, h_dot = momenta(body, d_alpha, d_a)
     p_dot = plus(p_dot, cross(omega, p))
     h_dot = plus(h_dot, plus(cross(omega, h), cross(v, p)))
     # The velocity against which drag acts, less what the acceleration in question adds to it.
@@ -333,17 +350,5 @@ def own_answer(block, like, wide, stride, plant, i):
     m_x, m_y, k_1, k_2 = m_x + lead * along, m_y + lead * k_0, lead * k_1, lead * k_2
     q = k_1 - e * m_y
     moved = e * (k_1 + q)
-    return (
-        J_x + lead * turning,
-        (J_y + k_2) - moved,
-        (J_z + k_2) - moved,
-        q,
-        m_x,
-        m_y,
-        n_x,
-        n_y + e * f_z,
-        n_z - e * f_y,
-        f_x,
-        f_y,
-        f_z,
-    )
+    J_x, J_y, J_z = J_x + lead * turning, (J_y + k_2) - moved, (J_z + k_2) - moved
+    return J_x, J_y, J_z, q, m_x, m_y, n_x, n_y + e * f_z, n_z - e * f_y, f_x, f_y, f_z
