@@ -211,8 +211,7 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
         if rows == 3:
             allocate(T, wrench, 3, 0.0, work, forces)
         else:
-            softness = ROLL_SOFTNESS * ROLL_SOFTNESS if model.watched else 0.0
-            allocate(T, wrench, rows, softness, work, forces)
+            allocate(T, wrench, rows, softness_of(model), work, forces)
         limit = physical(seen, model, model.thruster_limit)
         state[b, 0] = 1.0
         for j in range(model.thrusters):
@@ -226,6 +225,12 @@ def act(observation, state, model, allocation, force, attitude_gain, action):
 def rows_of(model: Model) -> int:
     """Rows of an allocation matrix: forces, moments on the attitude, one that damps roll."""
     return model.axes + model.angles + (1 if model.watched else 0)
+
+
+@shared
+def softness_of(model: Model) -> float:
+    """How soft the last row of an allocation is, as `allocate` takes it."""
+    return ROLL_SOFTNESS * ROLL_SOFTNESS if model.watched else 0.0
 
 
 @shared

@@ -12,12 +12,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from usm_baselines.laws.super_twisting import SuperTwisting
 
-from usm_agents.residual.observation import ResidualLayout, base_entries
+from usm_agents.residual.observation import PLANAR_POSTURE, ResidualLayout, base_entries
 from usm_agents.residual.task import Array, Flags, Memory, Residual
-from usm_gym.envs.env import checked_action
+from usm_gym.envs.env import TrackingEnv, checked_action
 from usm_gym.envs.usm import USMEnv, USMVectorEnv
+from usm_gym.envs.usm3d import USM3DEnv, USM3DVectorEnv
+from usm_gym.envs.vector_env import TrackingVectorEnv
+from usm_gym.task.modes import AnyMode, in_space
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.scenario import Mode
 
 
 class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
@@ -30,17 +32,18 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 
     ## Action
 
-    `Box(-1, 1)` in units of `residual_scale`. "force": force in x and y (N, global frame) on the
-    centre of mass, without a moment, shared out to the thrusters with least norm. "wrench": the
-    same with a moment (N m). "thrusters": forces of the thrusters (N). "estimates": what is added
-    to error, rate and disturbance in each axis, in units of the largest corrections; the base then
-    acts after the agent, which is shown neither its force and moment nor its own last action.
+    `Box(-1, 1)` in units of `residual_scale`. "force": force along the axes (N, global frame) on
+    the centre of mass, without a moment, shared out to the thrusters with least norm. "wrench": the
+    same with moments (N m) about the angles that are controlled. "thrusters": forces of the
+    thrusters (N). "estimates": what is added to error, rate and disturbance in each axis, in units
+    of the largest corrections; the base then acts after the agent, which is shown neither its force
+    and moment nor its own last action.
 
     ## Observation
 
     `Box(float32)`: what the base knows, what the navigator estimates and the nominal plant
     foresees, and the joint motion in a few numbers; physical value over scale, cut off at its
-    bound. In `field` and on the base "sta":
+    bound. In the plane, in `field` and on the base "sta":
 
     OBSERVATION_TABLE
     """
@@ -62,7 +65,7 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
         """
         gym.utils.RecordConstructorArgs.__init__(self, **residual)
         gym.Wrapper.__init__(self, env)
-        self._plain: USMEnv = env.unwrapped  # type: ignore[assignment]
+        self._plain: TrackingEnv = env.unwrapped  # type: ignore[assignment]
         # The agent's scales stay what they are when a scenario brings another noise.
         self._arguments = {"position_noise": self._plain.nominal.position_noise, **residual}
         self._residual = Residual(self._plain.nominal, **self._arguments)
@@ -107,7 +110,9 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
 # The class docstring is the specification; its table comes from the one that the code uses.
 ResidualEnv.__doc__ = (ResidualEnv.__doc__ or "").replace(
     "OBSERVATION_TABLE",
-    ResidualLayout(5, 2, base_entries(SuperTwisting.shown)).table().replace("\n", "\n    "),
+    ResidualLayout(("x", "y"), 1, 5, 2, base_entries(SuperTwisting.shown, 2), PLANAR_POSTURE)
+    .table()
+    .replace("\n", "\n    "),
 )
 
 
@@ -119,7 +124,7 @@ class ResidualVectorEnv(
 
     def __init__(
         self,
-        env: USMVectorEnv,
+        env: TrackingVectorEnv,
         **residual: Any,
     ) -> None:
         """Wrap a vector environment; arguments as of `ResidualEnv`."""
@@ -205,25 +210,27 @@ class ResidualVectorEnv(
 
 
 def make_residual_env(
-    mode: Mode,
+    mode: AnyMode,
     conditions: str | Mapping[str, Any] = "field",
     robot: Mapping[str, Any] | None = None,
     render_mode: str | None = None,
     **residual: Any,
 ) -> ResidualEnv:
     """Make the residual task of a mode; other arguments as of `Residual`."""
-    return ResidualEnv(USMEnv(mode, conditions, robot, render_mode), **residual)
+    plain: Any = USM3DEnv if in_space(mode) else USMEnv
+    return ResidualEnv(plain(mode, conditions, robot, render_mode), **residual)
 
 
 def make_residual_vector_env(
     num_envs: int,
-    mode: Mode,
+    mode: AnyMode,
     **arguments: Any,
 ) -> ResidualVectorEnv:
     """Make the residual task of many robots; arguments as of `USMVectorEnv` and `Residual`."""
+    plain: Any = USM3DVectorEnv if in_space(mode) else USMVectorEnv
     names = list(inspect.signature(Residual).parameters)[1:]
     residual = {name: arguments.pop(name) for name in names if name in arguments}
-    return ResidualVectorEnv(USMVectorEnv(num_envs, mode, **arguments), **residual)
+    return ResidualVectorEnv(plain(num_envs, mode, **arguments), **residual)
 
 
 def _made_for(nominal: Nominal, current: Residual, arguments: Mapping[str, Any]) -> Residual:

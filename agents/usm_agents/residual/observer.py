@@ -13,17 +13,17 @@ from usm_baselines.estimation.prediction import NAMES
 from usm_baselines.policy import ScriptedPolicy
 
 from usm_agents.residual.observation import ResidualLayout, base_entries
+from usm_agents.residual.posture import posture_of
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.policy import Policy
-from usm_gym.sensors import value
-from usm_gym.task.observation import ENTRY as PLAIN
-from usm_gym.task.observation import ObservationLayout
+from usm_gym.sensors import Layout
+from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# The entries that do not depend on the base, by name: their numbers in the order of the table.
-_NAMES = [entry.name for entry in ResidualLayout(thrusters=1, actions=1, base=()).complete]
+# The entries that do not depend on base and robot, by name: their numbers in the table.
+_NAMES = [entry.name for entry in ResidualLayout((), 0, 0, 0, (), ()).complete]
 ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
 # What is not shown to an agent that corrects estimates: the base has not acted yet, and what the
 # agent has corrected before is in the command.
@@ -32,15 +32,28 @@ FORESEEN = _NAMES.index(f"foreseen_error_{LEADS[0]}")  # the others follow
 
 
 class Plain(NamedTuple):
-    """How the plain observation is read, see `usm_gym.sensors.value`.
+    """How the plain observation is read.
 
     Attributes:
-        starts: First indices of the entries.
         scale: Physical value over observed value, by number.
+        position_error: Index of the first number of an entry.
+        position_age: The same.
+        velocity_age: The same.
+        thruster_command: The same.
+        thruster_limit: The same.
     """
 
-    starts: NDArray[np.int64]
     scale: Array
+    position_error: int
+    position_age: int
+    velocity_age: int
+    thruster_command: int
+    thruster_limit: int
+
+
+def plain_of(layout: Layout) -> Plain:
+    """How observations of a layout are read."""
+    return Plain(layout.scale, *(layout.slices[name].start for name in Plain._fields[1:]))
 
 
 class FrameTable(NamedTuple):
@@ -64,33 +77,18 @@ class FrameTable(NamedTuple):
 
 
 @piece
-def over_joints(seen, plain, entry, joints):
-    """Sum of a quantity over the joints."""
-    total = 0.0
-    for i in range(joints):
-        total += value(seen, plain, entry, i)
-    return total
-
-
-@piece
-def tail_over_mean(seen, plain, entry, joints):
-    """The tail's angle over the mean of all links', from the joints' angles; of rates likewise.
-
-    Joint i turns the links after it.
-    """
-    total = 0.0
-    for i in range(joints):
-        total += (joints - i) / (joints + 1) * value(seen, plain, entry, i)
-    return total
+def physical(seen, plain, index):
+    """One number of a plain observation in its physical unit."""
+    return seen[index] * plain.scale[index]
 
 
 @piece
 def fill_axes(frame, starts, seen, plain, signals, ahead, b):
     """Fill in what is measured, estimated and foreseen, axis by axis."""
-    frame[starts[ENTRY.position_age]] = value(seen, plain, PLAIN.position_age, 0)
-    frame[starts[ENTRY.velocity_age]] = value(seen, plain, PLAIN.velocity_age, 0)
+    frame[starts[ENTRY.position_age]] = physical(seen, plain, plain.position_age)
+    frame[starts[ENTRY.velocity_age]] = physical(seen, plain, plain.velocity_age)
     for axis in range(signals.y.shape[1]):
-        error = value(seen, plain, PLAIN.position_error, axis)
+        error = physical(seen, plain, plain.position_error + axis)
         frame[starts[ENTRY.position_error] + axis] = error
         frame[starts[ENTRY.reference_velocity] + axis] = signals.velocity[b, axis]
         frame[starts[ENTRY.reference_acceleration] + axis] = signals.acceleration[b, axis]
@@ -106,43 +104,17 @@ def fill_axes(frame, starts, seen, plain, signals, ahead, b):
 @piece
 def fill_wrench(frame, starts, seen, plain, T, action):
     """Fill in the wrench that the base asks for."""
-    limit = value(seen, plain, PLAIN.thruster_limit, 0)
-    for row in range(3):
+    limit = physical(seen, plain, plain.thruster_limit)
+    for row in range(T.shape[0]):
         total = 0.0
         for j in range(action.size):
             total += T[row, j] * (action[j] * limit)
-        at = starts[ENTRY.base_force] + row if row < 2 else starts[ENTRY.base_moment]
-        frame[at] = total
-
-
-@piece
-def fill_posture(frame, starts, seen, plain, joints):
-    """Fill in heading and joint motion."""
-    tail, rate = value(seen, plain, PLAIN.tail_angle, 0), value(seen, plain, PLAIN.tail_rate, 0)
-    frame[starts[ENTRY.heading]] = tail - tail_over_mean(seen, plain, PLAIN.joint_angles, joints)
-    frame[starts[ENTRY.heading_error]] = value(seen, plain, PLAIN.heading_error, 0)
-    frame[starts[ENTRY.heading_rate]] = rate - tail_over_mean(
-        seen, plain, PLAIN.joint_rates, joints
-    )
-    frame[starts[ENTRY.deflection]] = over_joints(seen, plain, PLAIN.joint_angles, joints)
-    frame[starts[ENTRY.deflection_rate]] = over_joints(seen, plain, PLAIN.joint_rates, joints)
-    reference = starts[ENTRY.reference_deflection]
-    frame[reference] = over_joints(seen, plain, PLAIN.joint_references, joints)
-    reference = starts[ENTRY.reference_deflection_rate]
-    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_rates, joints)
-    reference = starts[ENTRY.reference_deflection_acceleration]
-    frame[reference] = over_joints(seen, plain, PLAIN.joint_reference_accelerations, joints)
-    bending = 0.0
-    for i in range(joints):
-        if value(seen, plain, PLAIN.joint_references, i) != 0.0:
-            bending += 1.0
-    frame[starts[ENTRY.bending_joints]] = bending
+        frame[starts[ENTRY.base_force] + row] = total  # the moments follow the forces
 
 
 @compiled
-def show(table, plain, signals, ahead, action, state, last, start, past, seen, kept):
+def show(table, plain, signals, ahead, posture, action, state, last, start, past, seen, kept):
     """Fill in the observations `seen` and the frames `kept` of a batch; see `ResidualObserver`."""
-    joints = plain.starts[PLAIN.joint_rates] - plain.starts[PLAIN.joint_angles]
     frame = np.empty(table.complete)
     starts, width = table.starts, table.shown.size
     for b in range(seen.shape[0]):
@@ -152,11 +124,12 @@ def show(table, plain, signals, ahead, action, state, last, start, past, seen, k
             frame[table.base[k, 0]] = state[b, table.base[k, 1]]
         fill_wrench(frame, starts, measured, plain, signals.allocation[b], action[b])
         for j in range(signals.allocation.shape[2]):
-            command = value(measured, plain, PLAIN.thruster_command, j)
+            command = physical(measured, plain, plain.thruster_command + j)
             frame[starts[ENTRY.thruster_command] + j] = command
         for i in range(last.shape[1]):
             frame[starts[ENTRY.last_action] + i] = 0.0 if start[b] else last[b, i]
-        fill_posture(frame, starts, measured, plain, joints)
+        for i in range(posture.shape[1]):
+            frame[table.complete - posture.shape[1] + i] = posture[b, i]
         for k in range(seen.shape[1]):
             earlier = k < past.shape[1] and not start[b]
             number = past[b, k] if earlier else frame[table.shown[k % width]]
@@ -177,7 +150,7 @@ class ResidualObserver:
     def __init__(
         self,
         base: Policy,
-        plain: ObservationLayout,
+        robot: Any,
         actions: int,
         length: float,
         omit: tuple[str, ...],
@@ -185,21 +158,26 @@ class ResidualObserver:
         corrects: bool,
     ) -> None:
         """Take the base, whose state or estimates are shown, and what a `ResidualLayout` needs."""
+        world, self._posture = world_of(robot), posture_of(robot)
+        axes = len(world.axes)
         law = base if isinstance(base, ScriptedPolicy) else None
         columns: dict[str, Any] = {}
         if law is not None and corrects:
-            first = law.predictor_columns.start + len(NAMES) * np.arange(2)
+            first = law.predictor_columns.start + len(NAMES) * np.arange(axes)
             columns = {name: first + k for k, name in enumerate(NAMES)}
         elif law is not None:
             columns = {name: law.columns[name] for name in law.shown}
         entries = tuple(
             replace(entry, scale=length, bound=10 * length) if entry.unit == "m" else entry
-            for entry in base_entries(columns)
+            for entry in base_entries(columns, axes)
         )
         if corrects:
             omit = (*omit, *(name for name in NOT_TO_CORRECT if name not in omit))
-        self.layout = ResidualLayout(plain.thrusters, actions, entries, length, omit, frames)
-        whole = ResidualLayout(plain.thrusters, actions, entries, length)
+        moments = len(world.attitude) + len(world.watched)
+        whole = ResidualLayout(
+            world.axes, moments, world.thrusters, actions, entries, self._posture.entries, length
+        )
+        self.layout = replace(whole, omit=omit, frames=frames)
         numbers, slices = np.arange(whole.size), whole.slices
         places = [numbers[slices[entry.name]] for entry in entries]
         self._table = FrameTable(
@@ -210,7 +188,8 @@ class ResidualObserver:
             bound=self.layout.bound,
             complete=whole.size,
         )
-        self._plain = Plain(plain.starts, plain.scale)
+        self._plain = plain_of(world.layout)
+        self._numbers = sum(entry.size for entry in self._posture.entries)
         self.earlier = self.layout.size - len(self._table.shown)
 
     def update(
@@ -235,16 +214,18 @@ class ResidualObserver:
         Returns:
             The agent's observations, (batch, layout.size), and the frames for the next call.
         """
-        size = len(base_action)
+        size = base_action.shape[0]
         seen = np.empty((size, self._table.scale.size), np.float32)
-        kept = np.empty((size, self.earlier))
+        kept, posture = np.empty((size, self.earlier)), np.empty((size, self._numbers))
+        self._posture.fill(known.signals.observation, posture)
         show(
             self._table,
             self._plain,
             known.signals,
             known.ahead,
+            posture,
             base_action,
-            base_state if len(self._table.base) else _NOTHING,
+            base_state if self._table.base.size else _NOTHING,
             last_action,
             start,
             past,

@@ -13,6 +13,7 @@ from usm_baselines.contender import contender
 from usm_baselines.estimation.estimator import Estimate, Estimator, foreseen
 from usm_baselines.estimation.prediction import NAMES, believed
 from usm_baselines.policy import Percept, ScriptedPolicy, corrected
+from usm_baselines.signals import model_of, softness_of
 
 from usm_agents.residual.observation import DEVIATIONS, SHORT
 from usm_agents.residual.observer import ResidualObserver
@@ -21,7 +22,6 @@ from usm_gym.plant.thrusters import allocate
 from usm_gym.policy import Policy
 from usm_gym.support.validation import Count, Number, is_whole, require
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.observation import ObservationLayout
 from usm_gym.world import world_of
 
 Array = NDArray[np.float32]
@@ -46,7 +46,7 @@ class Memory(NamedTuple):
 
     Attributes:
         limit: Thruster limits, N, (batch,).
-        allocation: Allocation matrices, (batch, 3, thrusters).
+        allocation: Allocation matrices, (batch, forces and moments, thrusters).
         base_action: The base's commands over the limit, not clipped, (batch, thrusters); none
             where the agent corrects its estimates, since it acts only then.
         base_state: State of the base.
@@ -67,18 +67,19 @@ class Memory(NamedTuple):
 
 
 @compiled
-def correct_all(base_action, allocation, limit, residual, wrench, command):  # type: ignore[no-untyped-def]
+def correct_all(base_action, allocation, limit, residual, wrench, softness, command):  # type: ignore[no-untyped-def]
     """Fill in the commands over the limit, (batch, thrusters): the base's and a residual's.
 
-    Residuals are wrenches (N, N, N m), which the thrusters make with least norm, or forces of the
-    thrusters, N. A wrench of two numbers has no moment.
+    Residuals are wrenches, forces in N before moments in N m, which the thrusters make with least
+    norm, or forces of the thrusters, N. A wrench of forces alone has no moment.
     """
-    forces, work = np.empty(base_action.shape[1]), np.empty((7, 3))
-    wanted = np.zeros(3)
+    rows = allocation.shape[1]
+    forces, work = np.empty(base_action.shape[1]), np.empty((2 * rows + 1, rows))
+    wanted = np.zeros(rows)
     for b in range(len(command)):
         if wrench:
             wanted[: residual.shape[1]] = residual[b]
-            allocate(allocation[b], wanted, 3, 0.0, work, forces)
+            allocate(allocation[b], wanted, rows, softness, work, forces)
         else:
             forces[:] = residual[b]
         for j in range(forces.size):
@@ -127,7 +128,9 @@ class Residual:
         self.nominal = nominal
         self.base = base = _made(base, nominal)
         self._scale, self._action = float(residual_scale), action
-        plain = ObservationLayout(nominal.robot.links, len(nominal.robot.thrusters))
+        world = world_of(nominal.robot)
+        plain = world.layout
+        self._softness = softness_of(model_of(nominal))
         self._limit = plain.slices["thruster_limit"].start
         self._limit_scale = plain.scale[self._limit]
         self._corrected: ScriptedPolicy | None = None
@@ -140,11 +143,11 @@ class Residual:
         self._believing: Residual | None = None
         if isinstance(base, ResidualPolicy) and base.residual.corrects:
             self._believing = base.residual
-        axes = len(world_of(nominal.robot).axes)
+        axes = len(world.axes)
         numbers = {
             "force": axes,
-            "wrench": 3,
-            "thrusters": plain.thrusters,
+            "wrench": axes + len(world.attitude),
+            "thrusters": world.thrusters,
             "estimates": len(NAMES) * axes,
         }
         self.actions = numbers[action]
@@ -152,7 +155,13 @@ class Residual:
         noise = nominal.position_noise if position_noise is None else position_noise
         length = max(SHORT, DEVIATIONS * noise)
         self._observer = ResidualObserver(
-            base, plain, self.actions, length, tuple(omit), frames, action == "estimates"
+            base,
+            nominal.robot,
+            self.actions,
+            length,
+            tuple(omit),
+            frames,
+            action == "estimates",
         )
         self.layout = self._observer.layout
         self.correction = max(noise, LEAST_DEVIATION) * np.array(LARGEST_CORRECTION)
@@ -226,7 +235,13 @@ class Residual:
         residual = self._scale * action.astype(np.float64)
         as_wrench = self._action != "thrusters"
         correct_all(
-            memory.base_action, memory.allocation, memory.limit, residual, as_wrench, command
+            memory.base_action,
+            memory.allocation,
+            memory.limit,
+            residual,
+            as_wrench,
+            self._softness,
+            command,
         )
         return command, memory._replace(action=action)
 

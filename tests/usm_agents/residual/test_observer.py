@@ -109,7 +109,7 @@ def test_every_entry_of_the_table_is_filled_in(base, action, robot):
 
 def test_a_base_may_not_show_what_has_no_entry():
     with pytest.raises(ValueError, match="shown is 'mood'; allowed: error, rate"):
-        base_entries(["rate", "mood"])
+        base_entries(["rate", "mood"], 2)
 
 
 def calls(step, *arguments):
