@@ -95,15 +95,15 @@ def run(arguments: argparse.Namespace) -> None:
     given = {name: value for name, value in given.items() if value is not None}
     if "omit" in given:
         given["omit"] = tuple(given["omit"].split(","))
-    if "conditions" in given:
-        given["conditions"] = parse_conditions(given["conditions"])
     if arguments.resume:
         require(
             not given, "--resume", ", ".join(given), "--output alone; the plan is in that folder"
         )
         plan = read_plan(folder)
     else:
-        plan = Plan(**given)
+        named = given.pop("conditions", "field")
+        mode = Plan(**given).mode
+        plan = Plan(**given, conditions=parse_conditions(named, mode))
     if plan.algorithm in SETTINGS:
         check_installed("usm train", "agents", "sb3_contrib")
     print_schedule(plan, settings_of(plan.algorithm))

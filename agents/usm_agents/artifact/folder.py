@@ -39,7 +39,6 @@ from usm_gym.support.validation import (
 from usm_gym.task.conditions import conditions_of
 from usm_gym.task.modes import AnyMode
 from usm_gym.task.nominal import Nominal
-from usm_gym.task.scenario import Mode
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
 NEW_WEIGHTS = "policy.new.safetensors"  # for the moment between writing them and moving them
@@ -56,7 +55,7 @@ class Agent:
 
     Attributes:
         summary: What it is, in a line.
-        mode: "operation" or "torpedo".
+        mode: The mode, in the plane or in space.
         conditions: Under which it was trained.
         base: Id of the base policy.
         gains: All gains of the base, by name, -1e12 to 1e12.
@@ -78,7 +77,7 @@ class Agent:
     """
 
     summary: str
-    mode: Mode
+    mode: AnyMode
     conditions: dict[str, Any]
     base: str
     gains: dict[str, Gain]

@@ -27,7 +27,7 @@ from usm_agents.artifact.network import Network
 from usm_agents.learning.settings import SETTINGS
 from usm_agents.residual.env import ResidualVectorEnv
 from usm_gym.support.validation import is_whole, require
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.modes import AnyScenario
 
 Truth = dict[str, NDArray[np.float64]]
 
@@ -60,8 +60,8 @@ class TrainingSetup:
     seed: int
     envs: ResidualVectorEnv
     episode_seed: int
-    first_episodes: Sequence[Scenario]
-    draw: Callable[[np.random.Generator], Scenario]
+    first_episodes: Sequence[AnyScenario]
+    draw: Callable[[np.random.Generator], AnyScenario]
     truth: Callable[[], Truth]
     folder: Path
 

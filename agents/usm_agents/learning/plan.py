@@ -16,9 +16,8 @@ from usm_agents.learning.learner import algorithms
 from usm_agents.residual.task import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.support.files import read_bytes, write_json
 from usm_gym.support.validation import Count, UsageError, in_one_line, require, validated
-from usm_gym.task.conditions import FIELD, Conditions, preset_of
-from usm_gym.task.sampling import sample
-from usm_gym.task.scenario import Mode, Scenario
+from usm_gym.task.conditions import FIELD, IN_SPACE, Conditions, preset_of
+from usm_gym.task.modes import AnyMode, AnyScenario, presets_of, sample_of
 
 PLAN = "plan.json"
 # The scenarios on which an agent is scored in the end, as `usm evaluate` samples them.
@@ -79,9 +78,9 @@ class Plan:
         require(":" not in self.base, "base", self.base, "an id, or an id with a file of gains")
 
     @property
-    def mode(self) -> Mode:
+    def mode(self) -> AnyMode:
         """The mode of the task."""
-        mode: Mode = gym.registry[self.env.removeprefix("usm_agents:")].kwargs["mode"]
+        mode: AnyMode = gym.registry[self.env.removeprefix("usm_agents:")].kwargs["mode"]
         return mode
 
     @property
@@ -111,20 +110,21 @@ class Plan:
     def test_command(self, agent: str) -> str:
         """The command that scores the agent as the training does in the end."""
         words = ["usm", "evaluate", "--policies", agent, "--mode", self.mode]
-        if self.conditions != FIELD:
+        if self.conditions != presets_of(self.mode)["field"]:
             words += ["--conditions", self._conditions()]
         return shlex.join([*words, "--seed", str(TEST_SEED), "--episodes", str(TEST_EPISODES)])
 
     def _conditions(self) -> str:
         """The conditions as `--conditions` takes them."""
         if preset := preset_of(self.conditions):
-            return preset
-        changed, usual = self.record()["conditions"].items(), dataclasses.asdict(FIELD)
+            return preset.removesuffix(IN_SPACE)
+        field = presets_of(self.mode)["field"]
+        changed, usual = self.record()["conditions"].items(), dataclasses.asdict(field)
         return json.dumps({k: v for k, v in changed if v != _listed(usual[k])})
 
-    def scenario(self, random: np.random.Generator) -> Scenario:
+    def scenario(self, random: np.random.Generator) -> AnyScenario:
         """Draw a scenario of the training distribution."""
-        return sample(self.mode, self.conditions, random)
+        return sample_of(self.mode, self.conditions, random)
 
 
 _PLAN = TypeAdapter(Plan)

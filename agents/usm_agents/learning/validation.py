@@ -22,8 +22,8 @@ from usm_gym.support.seeding import VALIDATION, stream
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import shared_nominal
-from usm_gym.task.scenario import Scenario
 
 # Held-out scenarios of the training distribution, the same for all trainings.
 VALIDATION_EPISODES = 32
@@ -31,7 +31,7 @@ VALIDATION_EPISODES = 32
 Validation = dict[str, Any]
 
 
-def held_out(plan: Plan, residual: Residual, episodes: int) -> list[Scenario]:
+def held_out(plan: Plan, residual: Residual, episodes: int) -> list[AnyScenario]:
     """Draw the scenarios on which the agents of a plan are validated.
 
     Raises:
@@ -48,7 +48,11 @@ def held_out(plan: Plan, residual: Residual, episodes: int) -> list[Scenario]:
 
 
 def validate(
-    residual: Residual, network: Network, scenarios: Sequence[Scenario], steps: int, seconds: float
+    residual: Residual,
+    network: Network,
+    scenarios: Sequence[AnyScenario],
+    steps: int,
+    seconds: float,
 ) -> Validation:
     """Score a network after so many steps and seconds of its training."""
     scores = evaluate(ResidualPolicy(residual, network), scenarios)

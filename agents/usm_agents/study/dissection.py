@@ -23,7 +23,6 @@ from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy, is_privileged
 from usm_gym.suites import unseen
-from usm_gym.task.conditions import PRESETS
 from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import Nominal, shared_nominal
 from usm_gym.world import world_of
@@ -164,7 +163,7 @@ def dissected(home: Home, chosen: Sequence[StudyTraining]) -> dict[str, Dissecti
         plan = training.plan
         adds = plan.action != "estimates" and plan.base != "heading"
         if training.name in AGENTS and plan.seed == 0 and adds:
-            episodes = unseen(home.mode, PRESETS[home.tier], TEST_SEED, EPISODES)
+            episodes = unseen(home.mode, home.conditions, TEST_SEED, EPISODES)
             nominal = shared_nominal(episodes)
             policy = make_agent(nominal, str(training.folder))
             made[training.name] = dissect(policy, nominal, episodes)

@@ -9,8 +9,8 @@ from typing import Any
 
 from usm_agents.learning.plan import Plan
 from usm_gym.support.validation import require
-from usm_gym.task.conditions import FIELD, PRESETS, Conditions, preset_of
-from usm_gym.task.scenario import Mode
+from usm_gym.task.conditions import FIELD, IN_SPACE, PRESETS, Conditions, preset_of
+from usm_gym.task.modes import AnyMode, presets_of
 
 FORESEEN = ("foreseen_error_2", "foreseen_error_5", "foreseen_error_10", "foreseen_rate")
 # What an agent cannot tell from what is measured now.
@@ -144,11 +144,11 @@ class Home:
 
     Attributes:
         tier: Name of the preset of conditions.
-        mode: "operation" or "torpedo".
+        mode: The mode.
     """
 
     tier: str
-    mode: Mode
+    mode: AnyMode
 
     @property
     def name(self) -> str:
@@ -158,7 +158,12 @@ class Home:
     @property
     def sets(self) -> dict[str, Conditions]:
         """The conditions of all sets of scenarios there, by name; those of the tier first."""
-        return {self.tier: PRESETS[self.tier], **ELSEWHERE[self.tier]}
+        return {self.tier: self.conditions, **ELSEWHERE[self.tier]}
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions of the tier."""
+        return presets_of(self.mode)[self.tier.removesuffix(IN_SPACE)]
 
 
 def home_of(name: str) -> Home:

@@ -13,7 +13,7 @@ from usm_baselines.benchmark.results import Failures, MiddleSummary, Scores
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.metrics import MAX_ERROR, axes_of, objective
-from usm_gym.task.scenario import Mode
+from usm_gym.task.modes import AnyMode
 
 Steps = Annotated[int, Field(strict=True, ge=0)]
 
@@ -209,7 +209,7 @@ class HomeResult:
     """
 
     tier: str
-    mode: Mode
+    mode: AnyMode
     agents: Mapping[str, Trained]
     ablations: Mapping[str, Trained]
     rivals: Annotated[Mapping[str, Scored], Field(min_length=1)]
