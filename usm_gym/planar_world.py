@@ -142,6 +142,15 @@ class PlanarWorld(World):
         return self.robot.total_mass
 
     @property
+    def straight_body(self) -> tuple[Array, Array]:
+        """Inertia, kg, and linear drag, N s/m, along the straight body and across it, (2,)."""
+        robot = self.robot
+        added = np.array([0.0, robot.added_mass])
+        inertia = robot.total_mass + robot.links * added
+        drag = robot.links * np.array([robot.tangential_drag, robot.normal_drag])
+        return inertia, drag
+
+    @property
     def rows(self) -> int:
         """Rows of the body, then those of guidance."""
         return self._guidance + guidance.GUIDANCE_ROWS

@@ -13,12 +13,9 @@ from usm_gym.plant.references import NEVER, filter_coefficients
 from usm_gym.plant.spatial import layout as rows
 from usm_gym.plant.spatial.links import SpatialPlant
 from usm_gym.plant.thrusters import lag_shares
-from usm_gym.spatial_robot import SpatialRobot, Vector, Y, Z
+from usm_gym.spatial_robot import LINEAR_SHARE, SpatialRobot, Vector, Y, Z
 
 Array = NDArray[np.float64]
-
-# Linear drag along a link and in roll over that across it (and the radius squared, in roll).
-LINEAR_SHARE = 0.1
 
 
 def spatial_plant(

@@ -27,6 +27,8 @@ MOST_LINKS = 64
 UNIT_TOLERANCE = 1e-6
 # Further than this from its link's axis no thruster sits, radii of the link.
 LONGEST_ARM = 5.0
+# Linear drag along a link and in roll over that across it (and the radius squared, in roll).
+LINEAR_SHARE = 0.1
 # A layout whose smallest singular value is below this cannot hold some direction.
 SMALLEST_SINGULAR_VALUE = 1e-3
 
@@ -213,6 +215,18 @@ class SpatialRobot:
             self.roll_drag,
             self.cross_flow_drag,
         )
+
+    @property
+    def straight_body(self) -> tuple[Array, Array]:
+        """Of the straight body inertia with added mass, kg, and linear drag, N s/m, (3,) each.
+
+        The axes are x, along it, y and z.
+        """
+        along, across = self.added_mass_along, self.added_mass_across
+        added = np.array([along, across, across]) * self.displaced_masses.sum()
+        strips = self.water_density * float(self.radii @ self.lengths)
+        drag = self.linear_drag * strips * np.array([LINEAR_SHARE, 1.0, 1.0])
+        return self.total_mass + added, drag
 
     @property
     def straight_centre(self) -> Array:

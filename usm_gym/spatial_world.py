@@ -15,8 +15,6 @@ from usm_gym.kernels.compile import compiled, parallel, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.plant.spatial import layout as rows
 from usm_gym.plant.spatial.links import SpatialPlant
-from usm_gym.plant.spatial.posture import centre_of_mass, mass_velocity, place_links
-from usm_gym.plant.spatial.rotation import axes_of, out_of
 from usm_gym.plant.spatial.step import advance
 from usm_gym.plant.thrusters import command
 from usm_gym.spatial_packing import spatial_plant, spatial_row
@@ -28,6 +26,8 @@ from usm_gym.task.spatial_guidance import attitude_error, path_in_space, sight_i
 from usm_gym.task.spatial_observation import (
     SPATIAL_ENTRY,
     SpatialLayout,
+    attitude_of,
+    find_mass,
     measure_attitude,
     measure_joints,
     measure_thrusters,
@@ -80,36 +80,6 @@ def observe(fleet, plant, table, robot, lanes):
     put(observation, table, SPATIAL_ENTRY.velocity_age, 0, age)
     for k in range(observation.size):
         observation[k] = min(max(observation[k], -table.bound[k]), table.bound[k])
-
-
-@piece
-def attitude_of(row, lanes, lane):
-    """The attitude of the middle link of one robot."""
-    return (
-        number(row, lanes, lane, rows.Q),
-        number(row, lanes, lane, rows.Q + 1),
-        number(row, lanes, lane, rows.Q + 2),
-        number(row, lanes, lane, rows.Q + 3),
-    )
-
-
-@piece
-def find_mass(row, lanes, lane, plant, position, velocity):
-    """Fill in position, m, and velocity, m/s, of the centre of mass of one robot, (3,) each."""
-    links = plant.links
-    centre, frame = np.empty((links, 3)), np.empty((links, 9))
-    phi, rates = np.empty(links - 1), np.empty(links - 1)
-    for j in range(links - 1):
-        phi[j] = number(row, lanes, lane, rows.row_of(rows.PHI, links) + j)
-        rates[j] = number(row, lanes, lane, rows.row_of(rows.PHI_DOT, links) + j)
-    q, root = attitude_of(row, lanes, lane), vector(row, lanes, lane, rows.P)
-    place_links(plant, root, q, phi, centre, frame)
-    middle = centre_of_mass(plant, centre, frame)
-    for axis in range(AXES):
-        position[axis] = middle[axis]
-    omega = out_of(axes_of(q), vector(row, lanes, lane, rows.W))
-    moving = vector(row, lanes, lane, rows.V)
-    mass_velocity(plant, omega, moving, rates, frame, velocity)
 
 
 @piece
@@ -238,6 +208,11 @@ class SpatialWorld(World):
     def mass(self) -> float:
         """Mass of the robot, kg."""
         return self.robot.total_mass
+
+    @property
+    def straight_body(self) -> tuple[Array, Array]:
+        """Inertia, kg, and linear drag, N s/m, along x, y and z, (3,); see `World`."""
+        return self.robot.straight_body
 
     @property
     def rows(self) -> int:

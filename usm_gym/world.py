@@ -189,6 +189,14 @@ class World(ABC):
 
     @property
     @abstractmethod
+    def straight_body(self) -> tuple[Array, Array]:
+        """Inertia with added mass, kg, and linear drag, N s/m, in each axis, (axes,) each.
+
+        They are those of a robot that is straight, level and along x.
+        """
+
+    @property
+    @abstractmethod
     def quantities(self) -> Mapping[str, slice]:
         """Rows of the quantities that may be read, by name; `command`, N, among them."""
 

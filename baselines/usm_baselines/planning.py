@@ -3,9 +3,10 @@
 Of a plan it is known what comes of it. What changes of its commands add to that is taken from the
 linear model of the straight body (`kalman`). They minimise, summed over the periods,
 
-    |error|^2 + variation^2 |force - held|^2 + moment^2 (moment - wanted)^2 + effort^2 |u|^2,
+    |error|^2 + variation^2 |force - held|^2 + moment^2 |moment - wanted|^2 + effort^2 |u|^2,
 
-where the commands u, each within its limits, make the force and the moment. What the force is held
+where the commands u, each within its limits, make the force and the moment, which have as many
+components as the world has axes and angles. What the force is held
 to is up to the problem: the thrust, which lags behind it, or the force of the period before. If no
 limit is met this is one Newton step, from a Riccati recursion over
 the horizon. Else a primal-dual interior-point method takes several, each of them the same recursion
@@ -25,9 +26,6 @@ from usm_baselines.estimation.kalman import COMMAND, ERROR, RATE, THRUST
 from usm_baselines.signals import Array
 from usm_gym.kernels.compile import compiled, piece
 
-# Axes. The state has as many numbers of each: the error first, and last what the commanded force is
-# held to, over the inertia.
-AXES = 2
 # The interior-point method: how far inside the limits it begins, over the limit; its steps; how far
 # each of them may go towards the limits; by what it is to bring complementarity down.
 INSIDE, STEPS, REACH, SHRINKING = 0.1, 14, 0.99, 0.15
@@ -38,10 +36,13 @@ NEAREST = 1e-9
 class Problem(NamedTuple):
     """What the plans of all robots share.
 
+    The state has as many numbers of each axis: the error first, and last what the commanded force
+    is held to, over the inertia.
+
     Attributes:
         transition: Of the state over a period, (numbers, numbers).
-        input: What a force of 1 N commanded along an axis adds to it, (numbers, 2).
-        inertia: Inertia of the axes, kg, (2,).
+        input: What a force of 1 N commanded along an axis adds to it, (numbers, axes).
+        inertia: Inertia of the axes, kg, (axes,).
         variation: Error that is as bad as 1 N between the force and what it is held to, m/N.
         moment: Error that is as bad as a moment that is wrong by 1 N m, m/(N m).
         effort: Error that is as bad as 1 N of a thruster, m/N.
@@ -59,10 +60,10 @@ class Foreseen(NamedTuple):
     """What comes of the plans of a batch of robots, by period; or of the plan of one of them.
 
     Attributes:
-        error: Position errors at the end, m, (batch, periods, 2).
+        error: Position errors at the end, m, (batch, periods, axes).
         held: Forces along the axes that the commanded ones are held to, N, the same shape.
-        wanted: Wanted moments, N m, (batch, periods).
-        allocation: Allocation matrices, (batch, periods, 3, thrusters).
+        wanted: Wanted moments, N m, (batch, periods, moments).
+        allocation: Allocation matrices, (batch, periods, axes + moments, thrusters).
     """
 
     error: Array
@@ -77,8 +78,8 @@ class Room(NamedTuple):
     Attributes:
         gain: Change of the commands over change of the state, (periods, thrusters, numbers).
         change: Change of the commands, N, (periods, thrusters).
-        error: What that changes of the errors, m, (periods, 2).
-        held: What it changes of the forces that they are held to, N, (periods, 2).
+        error: What that changes of the errors, m, (periods, axes).
+        held: What it changes of the forces that they are held to, N, (periods, axes).
         curvature: Second derivatives that the limits add, (periods, thrusters).
         slope: First derivatives that they add, (periods, thrusters).
         low: Multipliers of the lower limits, (periods, thrusters).
@@ -104,7 +105,7 @@ def problem_of(
     *,
     changes: bool = False,
 ) -> Problem:
-    """The problem of a robot whose axes have these transitions, see `kalman`, (2, 4, 6).
+    """The problem of a robot whose axes have these transitions, see `kalman`, (axes, 4, 6).
 
     Args:
         transition: The transitions.
@@ -115,9 +116,9 @@ def problem_of(
         changes: Whether the force is held to that of the period before; else to the thrust.
     """
     rows = [ERROR, RATE, THRUST]
-    numbers = len(rows) + changes
-    A, B = np.zeros((AXES * numbers, AXES * numbers)), np.zeros((AXES * numbers, AXES))
-    for axis in range(AXES):
+    axes, numbers = len(transition), len(rows) + changes
+    A, B = np.zeros((axes * numbers, axes * numbers)), np.zeros((axes * numbers, axes))
+    for axis in range(axes):
         first = numbers * axis
         own = slice(first, first + len(rows))
         A[own, own] = transition[axis][np.ix_(rows, rows)]
@@ -159,15 +160,15 @@ def solve(H, X):
 @piece
 def misses(u, held, wanted, T, problem, D, C):
     """Fill in the residuals D du + C (dx, 1) of force and moment in a period, weighted."""
-    n = problem.transition.shape[0]
-    per_axis = n // AXES
-    for r in range(AXES + 1):
-        weight = problem.variation if r < AXES else problem.moment
-        C[r, n] = -weight * (held[r] if r < AXES else wanted)
+    n, axes = problem.input.shape
+    per_axis = n // axes
+    for r in range(T.shape[0]):
+        weight = problem.variation if r < axes else problem.moment
+        C[r, n] = -weight * (held[r] if r < axes else wanted[r - axes])
         for j in range(u.size):
             D[r, j] = weight * T[r, j]
             C[r, n] += D[r, j] * u[j]
-    for axis in range(AXES):
+    for axis in range(axes):
         C[axis, per_axis * (axis + 1) - 1] = -problem.variation * problem.inertia[axis]
 
 
@@ -176,23 +177,23 @@ def newton(u, foreseen, problem, room):
     """Fill in the gains of the Newton step, and its changes where the state does not change."""
     periods, m = u.shape
     A, effort = problem.transition, problem.effort**2
-    n = A.shape[0]
-    per_axis = n // AXES
+    (n, axes), rows = problem.input.shape, foreseen.allocation.shape[1]
+    per_axis = n // axes
     # Hessian and gradient of the value, the latter as the last column; so it is in VA, K and C.
     V, VA, VB = np.zeros((n, n + 1)), np.empty((n, n + 1)), np.empty((n, m))
-    B, D, C = np.empty((n, m)), np.empty((AXES + 1, m)), np.zeros((AXES + 1, n + 1))
+    B, D, C = np.empty((n, m)), np.empty((rows, m)), np.zeros((rows, n + 1))
     H, G, K = np.empty((m, m)), np.empty((m, n + 1)), np.empty((m, n + 1))
     for i in range(periods - 1, -1, -1):
         T = foreseen.allocation[i]
         misses(u[i], foreseen.held[i], foreseen.wanted[i], T, problem, D, C)
-        for axis in range(AXES):
+        for axis in range(axes):
             V[per_axis * axis, per_axis * axis] += 1.0
             V[per_axis * axis, n] += foreseen.error[i, axis]
         for matrix in (B, VB, H):
             matrix[:] = 0.0
         for matrix in (VA, G):
             matrix[:] = 0.0
-        add_product(problem.input, T[:AXES], B)
+        add_product(problem.input, T[:axes], B)
         add_product(V, A, VA[:, :n])
         VA[:, n] = V[:, n]
         add_product(V, B, VB)
@@ -216,8 +217,8 @@ def newton(u, foreseen, problem, room):
 def follow(foreseen, problem, room, closed):
     """Follow the changes of the commands through the model; `closed` adds what the gains make."""
     periods, m = room.change.shape
-    n = problem.transition.shape[0]
-    per_axis = n // AXES
+    n, axes = problem.input.shape
+    per_axis = n // axes
     x, after = np.zeros(n), np.empty(n)
     for i in range(periods):
         T = foreseen.allocation[i]
@@ -228,10 +229,10 @@ def follow(foreseen, problem, room, closed):
             after[r] = 0.0
             for k in range(n):
                 after[r] += problem.transition[r, k] * x[k]
-            for axis in range(AXES):
+            for axis in range(axes):
                 for j in range(m):
                     after[r] += problem.input[r, axis] * T[axis, j] * room.change[i, j]
-        for axis in range(AXES):
+        for axis in range(axes):
             room.held[i, axis] = problem.inertia[axis] * x[per_axis * (axis + 1) - 1]
             room.error[i, axis] = after[per_axis * axis]
         x[:] = after
@@ -276,14 +277,14 @@ def go_inside(u, limit, foreseen, problem, room):
             room.change[i, j] = min(max(u[i, j], -inner), inner) - u[i, j]
     follow(foreseen, problem, room, False)
     change_by(1.0, u, foreseen, room)
-    n = problem.transition.shape[0]
-    D, C, cost = np.empty((AXES + 1, m)), np.zeros((AXES + 1, n + 1)), 0.0
+    (n, axes), rows = problem.input.shape, foreseen.allocation.shape[1]
+    D, C, cost = np.empty((rows, m)), np.zeros((rows, n + 1)), 0.0
     for i in range(periods):
         T = foreseen.allocation[i]
         misses(u[i], foreseen.held[i], foreseen.wanted[i], T, problem, D, C)
-        for axis in range(AXES):
+        for axis in range(axes):
             cost += foreseen.error[i, axis] ** 2
-        for r in range(AXES + 1):
+        for r in range(rows):
             cost += C[r, n] ** 2
     mu = INSIDE * cost / (periods * m)
     for i in range(periods):
@@ -349,8 +350,8 @@ def improve(plan, limit, foreseen, problem):
         problem: What they share.
     """
     size, periods, m = plan.shape
-    gain = np.empty((periods, m, problem.transition.shape[0]))
-    changes = np.empty((2, periods, AXES))
+    n, axes = problem.input.shape
+    gain, changes = np.empty((periods, m, n)), np.empty((2, periods, axes))
     rest = np.empty((5, periods, m))
     room = Room(gain, rest[0], changes[0], changes[1], rest[1], rest[2], rest[3], rest[4])
     for b in range(size):

@@ -19,7 +19,6 @@ from usm_baselines.estimation.plant_navigator import PlantNavigator
 from usm_baselines.estimation.prediction import Predictor, tell
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
 from usm_baselines.space import Gain, declared
-from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
@@ -75,8 +74,8 @@ class ScriptedPolicy:
     shown: tuple[str, ...] = ()
     # What navigates, if something does.
     navigator: type[Navigator] | type[PlantNavigator] = PlantNavigator
-    # Whether the law computes with the inertia, drag or plant of the planar robot.
-    planar = False
+    # Whether the law models the thrusters' lag itself.
+    knows_lag = False
 
     def __init__(
         self,
@@ -101,7 +100,7 @@ class ScriptedPolicy:
 
         Raises:
             ValueError: If a gain is not finite, is negative, or is 0 and has to be positive; or if
-                the law is for planar robots and this is another.
+                the law foresees the motion and nothing foresees that of the robot.
         """
         chosen = self.Gains(**gains)
         for name, gain in declared(self.Gains).items():
@@ -119,14 +118,9 @@ class ScriptedPolicy:
         self.predictor: Predictor | None = None
         if isinstance(self._navigator, PlantNavigator):
             self.predictor = self._navigator.predictor
-        # Laws of the planar robot model the lag themselves.
-        require(not (lag and self.planar), "lag", lag, "False for a law that models it")
-        fitting = isinstance(nominal.robot, Robot) or not self.planar
-        require(fitting, "robot", nominal.robot, "the planar robot")
+        require(not (lag and self.knows_lag), "lag", lag, "False for a law that models it")
         require(allocation in ALLOCATIONS, "allocation", allocation, ", ".join(ALLOCATIONS))
         self._within_limits = allocation != PSEUDO_INVERSE
-        fitting = isinstance(nominal.robot, Robot) or not self._within_limits
-        require(fitting, "allocation", allocation, f"{PSEUDO_INVERSE} for this robot")
 
     @property
     def densities(self) -> tuple[float, float]:
@@ -267,7 +261,7 @@ class ScriptedPolicy:
         act(signals.observation, state, model, signals.allocation, force, gain, action)
         if self._within_limits:
             limit = model.scale[model.thruster_limit] * signals.observation[:, model.thruster_limit]
-            action = within(action, limit, model.dead_band, signals.allocation)
+            action = within(action, limit, model.dead_band, signals.allocation, model.axes)
         return action, state
 
     def _state(self, size: int, state: Array | None, episode_start: ArrayLike | None) -> Array:

@@ -185,28 +185,34 @@ def sense(state, model, signals):
             signals.u[b, axis] = force / model.mass - acceleration
 
 
-@compiled
-def act(observation, state, model, allocation, force, attitude_gain, action):
-    """Fill in the actions that make the forces (N) and the moments that turn the attitude back.
+@piece
+def wanted_moments(seen, model, attitude_gain, moments):
+    """Fill in the moments that turn the attitude back and damp roll, N m, (moments,).
 
     A moment is proportional to the error of an angle, in space as it will be a lead ahead.
     """
+    for i in range(model.angles):
+        angle_error = physical(seen, model, model.attitude_error + i)
+        if model.attitude_rate >= 0:
+            rate = physical(seen, model, model.attitude_rate + 1 + i)
+            rate -= physical(seen, model, model.reference_rate + i)
+            angle_error += ATTITUDE_LEAD * rate
+        moments[i] = -attitude_gain * angle_error
+    if model.watched:
+        rate = physical(seen, model, model.attitude_rate)
+        moments[model.angles] = saturated(-ROLL_DAMPING * rate, ROLL_LIMIT)
+
+
+@compiled
+def act(observation, state, model, allocation, force, attitude_gain, action):
+    """Fill in the actions that make the forces (N) and the moments of `wanted_moments`."""
     rows = rows_of(model)
     forces, wrench, work = np.empty(model.thrusters), np.empty(rows), np.empty((2 * rows + 1, rows))
     for b in range(observation.shape[0]):
         seen, T = observation[b], allocation[b]
         for axis in range(model.axes):
             wrench[axis] = force[b, axis]
-        for i in range(model.angles):
-            angle_error = physical(seen, model, model.attitude_error + i)
-            if model.attitude_rate >= 0:
-                rate = physical(seen, model, model.attitude_rate + 1 + i)
-                rate -= physical(seen, model, model.reference_rate + i)
-                angle_error += ATTITUDE_LEAD * rate
-            wrench[model.axes + i] = -attitude_gain * angle_error
-        if model.watched:
-            rate = physical(seen, model, model.attitude_rate)
-            wrench[rows - 1] = saturated(-ROLL_DAMPING * rate, ROLL_LIMIT)
+        wanted_moments(seen, model, attitude_gain, wrench[model.axes :])
         # Of three rows the compiler unrolls the loops.
         if rows == 3:
             allocate(T, wrench, 3, 0.0, work, forces)

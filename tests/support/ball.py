@@ -121,6 +121,7 @@ class BallWorld(World):
     kernels = Kernels(observe, run, run, run_threads)
     links, thrusters, rows, layout = 1, 3, ROWS, BallLayout()
     mass = property(lambda self: self.robot.mass)
+    straight_body = property(lambda self: (np.full(3, self.mass), np.full(3, self.robot.drag)))
     quantities = {"command": slice(COMMAND, LIMIT)}  # noqa: RUF012
 
     def write(self, scenario, row):

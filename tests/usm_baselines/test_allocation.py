@@ -11,7 +11,7 @@ from usm_gym import Conditions, evaluate
 from usm_gym.task.sampling import sample
 
 Array = NDArray[np.float64]
-THRUSTERS = 5
+THRUSTERS, AXES = 5, 2
 
 
 def problems(seed: int, size: int) -> tuple[Array, Array, Array]:
@@ -22,7 +22,7 @@ def problems(seed: int, size: int) -> tuple[Array, Array, Array]:
 
 def test_commands_are_the_least_squares_within_the_limits() -> None:
     wanted, limit, allocation = problems(0, 40)
-    command = nearest(wanted, limit, allocation)
+    command = nearest(wanted, limit, allocation, AXES)
     bound = 0
     for asked, T, u in zip(wanted, allocation, command, strict=True):
         weights = np.array([1.0, 1.0, MOMENT_WEIGHT])
@@ -38,7 +38,7 @@ def test_commands_are_the_least_squares_within_the_limits() -> None:
 
 def test_no_force_is_lost_that_a_thruster_has_left() -> None:
     wanted, limit, allocation = problems(1, 200)
-    command = nearest(wanted, limit, allocation)
+    command = nearest(wanted, limit, allocation, AXES)
 
     def missed(u: Array) -> Array:
         force = (allocation * (u - wanted)[:, np.newaxis]).sum(axis=2)[:, :2]
@@ -53,11 +53,11 @@ def test_within_the_limits_nothing_changes_and_robots_are_alone() -> None:
     wanted, limit, allocation = problems(2, 30)
     inside = (np.abs(wanted) <= 8.0).all(axis=1)
     assert 0 < inside.sum() < 30
-    command = nearest(wanted, limit, allocation)
+    command = nearest(wanted, limit, allocation, AXES)
     assert np.array_equal(command[inside], wanted[inside])
     for b in range(30):
         one = slice(b, b + 1)
-        assert np.array_equal(nearest(wanted[one], limit[one], allocation[one]), command[one])
+        assert np.array_equal(nearest(wanted[one], limit[one], allocation[one], AXES), command[one])
 
 
 def test_commands_keep_out_of_the_dead_band() -> None:
@@ -69,7 +69,7 @@ def test_commands_keep_out_of_the_dead_band() -> None:
 
 def test_actions_are_within_the_limits_and_outside_the_dead_band() -> None:
     wanted, limit, allocation = problems(3, 200)
-    action = within((wanted / 8.0).astype(np.float32), limit, 0.3, allocation)
+    action = within((wanted / 8.0).astype(np.float32), limit, 0.3, allocation, AXES)
     assert action.dtype == np.float32
     assert np.abs(action).max() <= 1.0
     force = np.abs(action.astype(np.float64)) * 8.0

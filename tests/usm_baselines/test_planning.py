@@ -10,40 +10,44 @@ from usm_baselines import planning
 from usm_baselines.estimation import kalman
 from usm_baselines.planning import Foreseen, Problem, problem_of
 
-from usm_gym import Robot
-
 Array = NDArray[np.float64]
 PERIODS, THRUSTERS = 8, 5
 improve: Any = planning.improve
-INERTIA = kalman.straight_body(Robot())[0]
+# Axes and moments in the plane and in space.
+PLANE, SPACE = (2, 1), (3, 3)
+INERTIA, DAMPING = np.array([10.6, 16.9, 13.1]), (0.3, 8.0, 2.0)
 
 
-def problem(lag: float) -> Problem:
-    transition = np.stack([kalman.sampled(damping, lag, 0.02) for damping in (0.3, 8.0)])
-    return problem_of(transition, INERTIA, 3e-6, 1e-5, 1e-6)
+def problem(lag: float, axes: int = 2) -> Problem:
+    transition = np.stack([kalman.sampled(damping, lag, 0.02) for damping in DAMPING[:axes]])
+    return problem_of(transition, INERTIA[:axes], 3e-6, 1e-5, 1e-6)
 
 
-def foreseen(rng: np.random.Generator, size: int, error: float) -> Foreseen:
+def foreseen(
+    rng: np.random.Generator, size: int, error: float, world: tuple[int, int] = PLANE
+) -> Foreseen:
     """Errors of this size that the limits matter for, and thrusters in arbitrary directions."""
+    axes, moments = world
     return Foreseen(
-        rng.normal(0.0, error, (size, PERIODS, 2)),
-        rng.normal(0.0, 3.0, (size, PERIODS, 2)),
-        rng.normal(0.0, 5.0, (size, PERIODS)),
-        rng.normal(0.0, 1.0, (size, PERIODS, 3, THRUSTERS)),
+        rng.normal(0.0, error, (size, PERIODS, axes)),
+        rng.normal(0.0, 3.0, (size, PERIODS, axes)),
+        rng.normal(0.0, 5.0, (size, PERIODS, moments)),
+        rng.normal(0.0, 1.0, (size, PERIODS, axes + moments, THRUSTERS)),
     )
 
 
 def residuals(change: Array, plan: Array, known: Foreseen, given: Problem) -> Array:
     """What the plan of one robot is to make small, after a change of its commands."""
-    x, rows = np.zeros(6), []
+    axes = given.inertia.size
+    x, rows = np.zeros(3 * axes), []
     for i in range(PERIODS):
         T, command = known.allocation[i], plan[i] + change[i]
-        held = known.held[i] + INERTIA * x[[2, 5]]
-        x = given.transition @ x + given.input @ (T[:2] @ change[i])
+        held = known.held[i] + given.inertia * x[2::3]
+        x = given.transition @ x + given.input @ (T[:axes] @ change[i])
         rows += [
-            known.error[i] + x[[0, 3]],
-            given.variation * (T[:2] @ command - held),
-            [given.moment * (T[2] @ command - known.wanted[i])],
+            known.error[i] + x[::3],
+            given.variation * (T[:axes] @ command - held),
+            given.moment * (T[axes:] @ command - known.wanted[i]),
             given.effort * command,
         ]
     return np.concatenate(rows)
@@ -55,9 +59,12 @@ def one(known: Foreseen, b: int) -> Foreseen:
 
 @pytest.mark.parametrize("lag", [0.0, 0.1])
 @pytest.mark.parametrize("limit", [5.0, 1e6])
-def test_a_plan_is_the_least_squares_within_the_limits(lag: float, limit: float) -> None:
+@pytest.mark.parametrize("world", [PLANE, SPACE])
+def test_a_plan_is_the_least_squares_within_the_limits(
+    lag: float, limit: float, world: tuple[int, int]
+) -> None:
     rng, size = np.random.default_rng(3), 4
-    known, given = foreseen(rng, size, 1e-4), problem(lag)
+    known, given = foreseen(rng, size, 1e-4, world), problem(lag, world[0])
     plan = rng.uniform(-5.0, 5.0, (size, PERIODS, THRUSTERS))
     before, at = plan.copy(), [one(known, b) for b in range(size)]
     improve(plan, np.full(size, limit), known, given)

@@ -11,8 +11,8 @@ import numpy as np
 
 from usm_gym.kernels.compile import compiled, piece
 from usm_gym.plant.spatial.layout import *
-from usm_gym.plant.spatial.posture import centre_of_mass, place_links
-from usm_gym.plant.spatial.rotation import cross, product
+from usm_gym.plant.spatial.posture import centre_of_mass, mass_velocity, place_links
+from usm_gym.plant.spatial.rotation import axes_of, cross, out_of, product
 from usm_gym.sensors import Entry, Layout
 
 _OF_JOINTS = "joint i turns link i + 1 against link i, right-handed"
@@ -148,6 +148,36 @@ def vector(row, lanes, lane, index):
         number(row, lanes, lane, index + 1),
         number(row, lanes, lane, index + 2),
     )
+
+
+@piece
+def attitude_of(row, lanes, lane):
+    """The attitude of the middle link of one robot."""
+    return (
+        number(row, lanes, lane, Q),
+        number(row, lanes, lane, Q + 1),
+        number(row, lanes, lane, Q + 2),
+        number(row, lanes, lane, Q + 3),
+    )
+
+
+@piece
+def find_mass(row, lanes, lane, plant, position, velocity):
+    """Fill in position, m, and velocity, m/s, of the centre of mass of one robot, (3,) each."""
+    links = plant.links
+    centre, frame = np.empty((links, 3)), np.empty((links, 9))
+    phi, rates = np.empty(links - 1), np.empty(links - 1)
+    for j in range(links - 1):
+        phi[j] = number(row, lanes, lane, row_of(PHI, links) + j)
+        rates[j] = number(row, lanes, lane, row_of(PHI_DOT, links) + j)
+    q, root = attitude_of(row, lanes, lane), vector(row, lanes, lane, P)
+    place_links(plant, root, q, phi, centre, frame)
+    middle = centre_of_mass(plant, centre, frame)
+    for axis in range(3):
+        position[axis] = middle[axis]
+    omega = out_of(axes_of(q), vector(row, lanes, lane, W))
+    moving = vector(row, lanes, lane, V)
+    mass_velocity(plant, omega, moving, rates, frame, velocity)
 
 
 @piece

@@ -56,7 +56,7 @@ class Estimator:
             nominal: Nominal knowledge.
 
         Raises:
-            ValueError: If the robot is not the planar one.
+            ValueError: If nothing foresees the robot.
         """
         self._world, self._model = world_of(nominal.robot), model_of(nominal)
         self._shared = shared_size(self._model)

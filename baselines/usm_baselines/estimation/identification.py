@@ -14,19 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from usm_baselines.estimation.foresight import estimates_of
 from usm_baselines.estimation.late_filter import covariance, memory_size, navigate
 from usm_baselines.estimation.navigator import navigation, transition_of
-from usm_baselines.estimation.prediction import (
-    AXES,
-    CURRENT,
-    ESTIMATES,
-    THRUSTER_GAINS,
-    Predictor,
-    advance_all,
-    note,
-    place,
-    predicted,
-)
+from usm_baselines.estimation.prediction import Predictor, note, predicted
 from usm_baselines.signals import Array, Signals
 from usm_gym.kernels.compile import compiled
 from usm_gym.kernels.lanes import WIDTH
@@ -38,55 +29,58 @@ STEP, LEAST, MOST = 1e-4, 0.2, 5.0
 
 
 @compiled
-def place_variations(observation, nominal, state, beliefs, parameters, blocks):
-    """Place every robot as it was a period ago, and once more for each parameter changed a little.
+def vary(beliefs, varied):
+    """Fill in copies of every belief: itself, then with each parameter changed a little.
 
     Args:
-        observation: Observations now, (batch, numbers).
-        nominal: The nominal robot.
-        state: State of the predictor, (batch, size).
-        beliefs: What the robots are believed to be, (batch, numbers); the first are parameters.
-        parameters: How many parameters there are.
-        blocks: Where to write; a robot has as many blocks as its lanes fill.
+        beliefs: What the robots are believed to be, (robots, numbers); the first are parameters.
+        varied: Where to write, (robots, 1 + parameters, numbers).
     """
-    last = ESTIMATES + nominal.plant.thruster_links.size
-    each = (parameters + WIDTH) // WIDTH
-    for b in range(observation.shape[0]):
-        own, belief = state[b], beliefs[b]
-        for lane in range(parameters + 1):
-            if lane > 0:
-                belief[lane - 1] += STEP
-            block = blocks[each * b + lane // WIDTH]
-            place(own[last:], nominal, own, observation[b], belief, block, lane % WIDTH)
-            if lane > 0:
-                belief[lane - 1] -= STEP
+    for b in range(varied.shape[0]):
+        belief = beliefs[b]
+        for copy in range(varied.shape[1]):
+            if copy > 0:
+                belief[copy - 1] += STEP
+            varied[b, copy] = belief
+            if copy > 0:
+                belief[copy - 1] -= STEP
 
 
 @compiled
-def identify(signals, nominal, nav, linear, parameters, blocks, state):
-    """Bring the state of a batch to the present; its last numbers are parameters and memory."""
-    last = ESTIMATES + nominal.plant.thruster_links.size
-    each = (parameters + WIDTH) // WIDTH
-    estimate, changed = np.empty(nav.size), np.empty(3)
-    transition = linear.copy()
+def identify(signals, kept, nav, linear, ahead, blocks, state):
+    """Bring the state of a batch to the present; its last numbers are parameters and memory.
+
+    Args:
+        signals: What was measured and applied.
+        kept: Where things are.
+        nav: The filter.
+        linear: What `transition_of` returns.
+        ahead: What was predicted for now of all copies, (robots, 1 + parameters, axes, 2).
+        blocks: Their blocks.
+        state: State of the predictor, (robots, size).
+    """
+    model, copies = kept.model, ahead.shape[1]
+    estimates = estimates_of(model.axes)
+    estimate, transition = np.empty(nav.size), linear.copy()
     for b in range(signals.observation.shape[0]):
         seen, own, started = signals.observation[b], state[b], signals.started[b]
-        before, known = own[last:], last + seen.size
-        estimate[:ESTIMATES] = own[:ESTIMATES]
-        estimate[ESTIMATES:] = own[known : known + parameters]
-        for axis in range(AXES):
-            mine, first = estimate[3 * axis : 3 * axis + 3], blocks[each * b]
-            predicted(seen, before, started, nominal, first, 0, axis, mine)
-            for lane in range(1, parameters + 1):
-                block = blocks[each * b + lane // WIDTH]
-                predicted(seen, before, started, nominal, block, lane % WIDTH, axis, changed)
+        known, memory = kept.last + seen.size, kept.last + seen.size + copies - 1
+        estimate[:estimates] = own[:estimates]
+        estimate[estimates:] = own[known:memory]
+        for axis in range(model.axes):
+            mine = estimate[3 * axis : 3 * axis + 3]
+            predicted(seen, model, started, ahead[b, 0], axis, mine)
+            for copy in range(1, copies):
                 for i in range(2):
-                    slope = (changed[i] - mine[i]) / STEP if started > 0.0 else 0.0
-                    transition[3 * axis + i, ESTIMATES + lane - 1] = slope
-        navigate(seen, nav, started, transition, estimate, own[known + parameters :])
-        own[:ESTIMATES] = estimate[:ESTIMATES]
-        own[known : known + parameters] = estimate[ESTIMATES:]
-        note(seen, started, nominal, blocks[each * b], 0, own)
+                    slope = 0.0
+                    if started > 0.0:
+                        slope = (ahead[b, copy, axis, i] - mine[i]) / STEP
+                    transition[3 * axis + i, estimates + copy - 1] = slope
+        navigate(seen, nav, started, transition, estimate, own[memory:])
+        own[:estimates] = estimate[:estimates]
+        own[known:memory] = estimate[estimates:]
+        first = b * copies
+        note(seen, started, kept, blocks[first // WIDTH], first % WIDTH, own)
 
 
 class Identifier(Predictor):
@@ -114,15 +108,15 @@ class Identifier(Predictor):
             drift: Spectral densities of what drives them, in their units over sqrt(s), (3,).
 
         Raises:
-            ValueError: If the robot is not the planar one, or a density is not above 0.
+            ValueError: If nothing foresees the robot, or a density is not above 0.
         """
         super().__init__(nominal, acceleration_noise, disturbance_noise)
-        numbers = (CURRENT, THRUSTER_GAINS - CURRENT, self._thrusters)
+        parts = self.coefficients, self.current, self.gains
+        numbers = [part.stop - part.start for part in parts]
         more = list(zip(np.repeat(spread, numbers), np.repeat(drift, numbers), strict=True))
         self._parameters = len(more)
         densities = acceleration_noise, disturbance_noise
         self._identifying = navigation(nominal, *densities, more)
-        self._known = ESTIMATES + self._thrusters + self._nominal.scale.size
         self._memory = self._known + self._parameters
         self.size = self._memory + memory_size(self._identifying)
 
@@ -130,22 +124,22 @@ class Identifier(Predictor):
         """What the robots of a batch are believed to be, (batch, numbers)."""
         beliefs = super().beliefs(state)
         beliefs[:, : self._parameters] += state[:, self._known : self._memory]
-        for part in (slice(0, CURRENT), slice(THRUSTER_GAINS, self._parameters)):
+        for part in (self.coefficients, self.gains):
             np.clip(beliefs[:, part], LEAST, MOST, out=beliefs[:, part])
         return beliefs
 
     def uncertainty(self, state: Array) -> Array:
         """Standard deviations of the parameters, as beliefs have them, (batch, parameters)."""
         P = covariance(self._identifying, state[:, self._memory :])
-        return np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, ESTIMATES:])
+        return np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, self.estimates :])
 
     def estimate(self, signals: Signals, state: Array) -> None:
         """Bring the state, (batch, size), to the present, in place."""
-        nominal, parameters, seen = self._nominal, self._parameters, signals.observation
-        each = (parameters + WIDTH) // WIDTH
-        blocks = np.zeros((each * len(seen), nominal.row.size * WIDTH))
-        place_variations(seen, nominal, state, self.beliefs(state), parameters, blocks)
-        advance_all(blocks, nominal.plant)
+        beliefs = self.beliefs(state)
+        varied = np.empty((len(state), 1 + self._parameters, beliefs.shape[1]))
+        vary(beliefs, varied)
+        blocks, ahead = self._moved(signals, state, varied)
         nav = self._identifying
-        linear = transition_of(self._linear, nav.size)
-        identify(signals, nominal, nav, linear, parameters, blocks, state)
+        identify(
+            signals, self._kept, nav, transition_of(self._linear, nav.size), ahead, blocks, state
+        )

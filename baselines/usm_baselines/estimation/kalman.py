@@ -1,9 +1,8 @@
 """The linear nominal model of one axis, and the Kalman filter on it.
 
-The model of an axis is that of the straight body, which lies along x: in x it has its mass and
-the drag along the links, in y also the added mass and the drag across them. With the tracking
-error e, its rate v, a constant unknown disturbance d, the thrust f and its command u over the
-inertia, and a known acceleration w:
+The model of an axis is that of the straight body, which lies along x (`World.straight_body`): its
+mass with added mass and its linear drag. With the tracking error e, its rate v, a constant unknown
+disturbance d, the thrust f and its command u over the inertia, and a known acceleration w:
 
     e' = v,   v' = -(drag / inertia) v + d + f + w,   d' = 0,   f' = (u - f) / lag.
 
@@ -21,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.kernels.compile import piece
-from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
+from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
 
@@ -39,32 +38,19 @@ SMALLEST_NOISE = 1e-5
 
 
 class Linear(NamedTuple):
-    """The sampled model and the filter of both axes, in the form that kernels take.
+    """The sampled model and the filter of all axes, in the form that kernels take.
 
     Attributes:
-        inertia: Mass with added mass of the straight body, kg, (2,).
-        damping: Its linear drag over that, 1/s, (2,).
-        transition: (e, v, d, f) at the end of a period from (e, v, d, f, u, w), (2, 4, 6).
-        correction: Gains of the filter on (e, v, d), (2, 3).
+        inertia: Mass with added mass of the straight body, kg, (axes,).
+        damping: Its linear drag over that, 1/s, (axes,).
+        transition: (e, v, d, f) at the end of a period from (e, v, d, f, u, w), (axes, 4, 6).
+        correction: Gains of the filter on (e, v, d), (axes, 3).
     """
 
     inertia: Array
     damping: Array
     transition: Array
     correction: Array
-
-
-def straight_body(robot: Robot) -> tuple[Array, Array]:
-    """Inertia (kg) and linear drag (N s/m) of the straight body along x and across it, (2,).
-
-    Raises:
-        ValueError: If the robot is not the planar one.
-    """
-    require(isinstance(robot, Robot), "robot", robot, "the planar robot")
-    added = np.array([0.0, robot.added_mass])
-    inertia = robot.total_mass + robot.links * added
-    drag = robot.links * np.array([robot.tangential_drag, robot.normal_drag])
-    return inertia, drag
 
 
 def sampled(damping: float, lag: float, h: float) -> Array:
@@ -125,7 +111,7 @@ def linear_model(nominal: Nominal, acceleration_noise: float, disturbance_noise:
     require(acceleration_noise > 0, "acceleration_noise", acceleration_noise, "a number > 0")
     require(disturbance_noise > 0, "disturbance_noise", disturbance_noise, "a number > 0")
     h, lag = nominal.control_period, nominal.thruster_time_constant
-    inertia, drag = straight_body(nominal.robot)
+    inertia, drag = world_of(nominal.robot).straight_body
     damping = drag / inertia
     transition = np.stack([sampled(each, lag, h) for each in damping])
     measurement = max(nominal.position_noise, SMALLEST_NOISE)

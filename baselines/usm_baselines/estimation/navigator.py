@@ -106,7 +106,7 @@ class Navigator:
             disturbance_noise: Spectral density of what drives d, m/s^3 / sqrt(Hz).
 
         Raises:
-            ValueError: If a density is not above 0, or the robot is not the planar one.
+            ValueError: If a density is not above 0.
         """
         self._linear = kalman.linear_model(nominal, acceleration_noise, disturbance_noise)
         self.constants = navigation(nominal, acceleration_noise, disturbance_noise)
@@ -174,7 +174,7 @@ def navigation(
     measures = nominal.velocity_period is not None
     velocity_delay = nominal.velocity_delay if measures else -1
     fix = max(nominal.position_noise, kalman.SMALLEST_NOISE) ** 2
-    inertia, drag = kalman.straight_body(nominal.robot)
+    inertia, drag = world.straight_body
     size = STATES * len(inertia) + len(more)
     noise, start = np.zeros((size, size)), np.zeros((size, size))
     for axis, damping in enumerate(drag / inertia):

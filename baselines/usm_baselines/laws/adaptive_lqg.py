@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_baselines.estimation.identification import Identifier
-from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS
 from usm_baselines.laws.joint_lqg import JointLQG, JointLQGGains
 from usm_baselines.policy import HEADING_GAIN, Percept
 from usm_baselines.signals import Array
@@ -60,16 +59,16 @@ class AdaptiveLQG(JointLQG):
 
         Returns:
             Those of `JointLQG`, (batch, axes); what has been identified, `coefficients` over their
-            nominal values, (batch, 6), `current`, m/s, (batch, 2), and `thruster_gains`, force over
-            command, (batch, thrusters); and the standard deviation of each, `NAME_std`.
+            nominal values, (batch, 6), `current`, m/s, (batch, axes), and `thruster_gains`, force
+            over command, (batch, thrusters); and the standard deviation of each, `NAME_std`.
         """
-        own = state[:, self._own :]
-        beliefs, uncertainty = self._identifier.beliefs(own), self._identifier.uncertainty(own)
+        own, learner = state[:, self._own :], self._identifier
+        beliefs, uncertainty = learner.beliefs(own), learner.uncertainty(own)
         named = super().state_of(state)
         for name, part in {
-            "coefficients": slice(0, CURRENT),
-            "current": slice(CURRENT, THRUSTER_GAINS),
-            "thruster_gains": slice(THRUSTER_GAINS, uncertainty.shape[1]),
+            "coefficients": learner.coefficients,
+            "current": learner.current,
+            "thruster_gains": learner.gains,
         }.items():
             named |= {name: beliefs[:, part], f"{name}_std": uncertainty[:, part]}
         return named
@@ -79,10 +78,10 @@ class AdaptiveLQG(JointLQG):
     ) -> tuple[NDArray[np.float32], Array]:
         """Act as `JointLQG` does, and make up for the gains that thrusters are believed to have."""
         action, state = super().decide(known, correction)
-        return compensated(action, self._identifier.beliefs(state[:, self._own :])), state
+        beliefs = self._identifier.beliefs(state[:, self._own :])
+        return compensated(action, beliefs[:, self._identifier.gains]), state
 
 
-def compensated(action: NDArray[np.float32], beliefs: Array) -> NDArray[np.float32]:
-    """Actions that make the forces asked for, thruster gains being as they are believed to be."""
-    gains = beliefs[:, THRUSTER_GAINS : THRUSTER_GAINS + action.shape[1]]
+def compensated(action: NDArray[np.float32], gains: Array) -> NDArray[np.float32]:
+    """Actions that make the forces asked for, force over command being `gains`, of their shape."""
     return np.asarray(action / gains, np.float32)

@@ -100,13 +100,13 @@ class DisturbanceObserver(ScriptedPolicy):
     # (e, v, d, f) of `kalman`; d is what the nominal model leaves out.
     state = ("error", "rate", "unmodelled", "thrust")
     shown = ("rate", "unmodelled")
-    planar = True
+    knows_lag = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the observer's gains; gains other than the defaults by name."""
         super().__init__(nominal, navigated=is_needed(nominal), **gains)
         omega, h, lag = self.gains.observer_bandwidth, self._model.h, nominal.thruster_time_constant
-        inertia, drag = kalman.straight_body(nominal.robot)
+        inertia, drag = self._world.straight_body
         transition = np.stack([kalman.sampled(each, lag, h) for each in drag / inertia])
         correction = np.stack([q_gain(T, omega, h) for T in transition])
         self._linear = Linear(inertia, drag / inertia, transition, correction)

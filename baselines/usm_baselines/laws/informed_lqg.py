@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from usm_baselines.estimation.prediction import CURRENT, THRUSTER_GAINS, Predictor
+from usm_baselines.estimation.prediction import Predictor
 from usm_baselines.laws.adaptive_lqg import compensated
 from usm_baselines.laws.joint_lqg import JointLQG
 from usm_baselines.policy import Percept
@@ -40,11 +40,10 @@ class Told(Predictor):
 
     def _constants(self, scenario: Any) -> Array:
         belief, water = self._neutral.copy(), scenario.water
-        belief[:CURRENT] = water.coefficients
-        belief[CURRENT:THRUSTER_GAINS] = water.current
-        factors = THRUSTER_GAINS + self._thrusters
-        belief[THRUSTER_GAINS:factors] = scenario.thruster_gains or 1.0
-        belief[factors:] = water.link_factors or 1.0
+        belief[self.coefficients] = water.coefficients
+        belief[self.current] = water.current
+        belief[self.gains] = scenario.thruster_gains or 1.0
+        belief[self.factors] = water.link_factors or 1.0
         return belief
 
 
@@ -71,4 +70,4 @@ class InformedLQG(PrivilegedPolicy, JointLQG):
     ) -> tuple[NDArray[np.float32], Array]:
         """Act as `JointLQG` does, and make up for the gains that thrusters have."""
         action, state = super().decide(known, correction)
-        return compensated(action, self._told.truth), state
+        return compensated(action, self._told.truth[:, self._told.gains]), state

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from usm_baselines.estimation import kalman, prediction
+from usm_baselines.estimation.foresight import estimates_of
 from usm_baselines.estimation.kalman import DISTURBANCE, ERROR, RATE, STATES, THRUST
-from usm_baselines.estimation.prediction import ESTIMATES, Predictor, believed, held_force
+from usm_baselines.estimation.prediction import Predictor, believed, held_force
 from usm_baselines.laws.lqg import LQG, regulate
 from usm_baselines.policy import HEADING_GAIN
 from usm_baselines.signals import Array, Signals
@@ -72,7 +73,7 @@ def joint_lqg(signals, model, linear, gain, state, beliefs, ahead, force):
         inertia, transition = linear.inertia[axis], linear.transition[axis]
         last, thrust = held_force(signals, model, beliefs[b], b, axis) / inertia, 0.0
         for j in range(model.thrusters):
-            thrust += signals.allocation[b, axis, j] * state[b, ESTIMATES + j]
+            thrust += signals.allocation[b, axis, j] * state[b, estimates_of(model.axes) + j]
         own[ERROR], own[RATE] = state[b, 3 * axis], state[b, 3 * axis + 1]
         own[DISTURBANCE], own[THRUST] = 0.0, thrust / inertia
         held[:], unit[:] = own, 0.0

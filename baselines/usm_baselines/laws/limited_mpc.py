@@ -21,7 +21,7 @@ from usm_baselines.estimation import kalman
 from usm_baselines.estimation.prediction import believed
 from usm_baselines.laws.mpc import MPC
 from usm_baselines.planning import Foreseen, improve, problem_of
-from usm_baselines.signals import Array, Signals, commanded, physical
+from usm_baselines.signals import Array, Signals, commanded, physical, wanted_moments
 from usm_gym.kernels.compile import compiled
 from usm_gym.task.nominal import Nominal
 
@@ -43,12 +43,13 @@ def hold(signals, model, heading_gain, ahead, plan, foreseen, limit):
         foreseen: Where to write what comes of them.
         limit: Where to write the limits of the thrusters, N, (batch,).
     """
+    moments = np.empty(foreseen.wanted.shape[2])
     for b in range(plan.shape[0]):
         seen, T = signals.observation[b], signals.allocation[b]
         limit[b] = physical(seen, model, model.thruster_limit)
-        moment = -heading_gain * physical(seen, model, model.attitude_error)
+        wanted_moments(seen, model, heading_gain, moments)
         for i in range(plan.shape[1]):
-            foreseen.wanted[b, i] = moment
+            foreseen.wanted[b, i] = moments
             foreseen.allocation[b, i] = T
             for j in range(model.thrusters):
                 plan[b, i, j] = commanded(seen, model, j)
@@ -75,7 +76,7 @@ class LimitedMPC(MPC):
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Set up the problem; gains other than the defaults by name."""
         super().__init__(nominal, allocation=QUADRATIC_PROGRAM, **gains)
-        inertia, drag = kalman.straight_body(nominal.robot)
+        inertia, drag = self._world.straight_body
         lag, weight = nominal.thruster_time_constant, self.gains.variation_weight
         self._problem = problem_of(
             np.stack([kalman.sampled(each, lag, self._model.h) for each in drag / inertia]),
@@ -94,7 +95,7 @@ class LimitedMPC(MPC):
         foreseen = Foreseen(
             error=np.empty((size, self._periods, axes)),
             held=np.empty((size, self._periods, axes)),
-            wanted=np.empty((size, self._periods)),
+            wanted=np.empty((size, self._periods, signals.allocation.shape[1] - axes)),
             allocation=np.empty((size, self._periods, *signals.allocation.shape[1:])),
         )
         hold(signals, self._model, self.gains.heading_gain, ahead, plan, foreseen, limit)

@@ -107,7 +107,7 @@ class LQG(ScriptedPolicy):
     # (e, v, d, f) of `kalman`; d is what the nominal model leaves out.
     state: tuple[str, ...] = ("error", "rate", "unmodelled", "thrust")
     shown = ("rate", "unmodelled")
-    planar = True
+    knows_lag = True
     navigator = Navigator
     # Whether the linear model predicts.
     linear = True

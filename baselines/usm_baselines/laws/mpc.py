@@ -102,7 +102,7 @@ class MPC(ScriptedPolicy):
     Gains = MPCGains
     state = prediction.NAMES
     shown = ("rate", "unmodelled")
-    planar = True
+    knows_lag = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Compute the gains of filter and regulator; gains other than the defaults by name."""

@@ -26,7 +26,7 @@ from usm_baselines.estimation import kalman
 from usm_baselines.planning import Foreseen, improve, problem_of
 from usm_baselines.policy import HEADING_GAIN, Percept
 from usm_baselines.privileged import PrivilegedPolicy
-from usm_baselines.signals import Array
+from usm_baselines.signals import ATTITUDE_LEAD, ROLL_DAMPING, ROLL_LIMIT, Array, rows_of
 from usm_baselines.space import Gain
 from usm_gym.simulation import Simulation, Snapshot
 from usm_gym.task.nominal import Nominal
@@ -57,12 +57,12 @@ class Oracle(PrivilegedPolicy):
     """
 
     Gains = OracleGains
-    planar = True
+    knows_lag = True
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:
         """Set up the problem; gains other than the defaults by name."""
         super().__init__(nominal, **gains)
-        inertia, drag = kalman.straight_body(nominal.robot)
+        inertia, drag = self._world.straight_body
         h, lag = nominal.control_period, nominal.thruster_time_constant
         self._periods = max(1, round(self.gains.horizon / h))
         self._problem = problem_of(
@@ -101,15 +101,29 @@ class Oracle(PrivilegedPolicy):
         """Run ahead with a plan, (batch, periods, thrusters)."""
         size, periods, thrusters = plan.shape
         error, thrust = np.empty((2, size, periods, self._model.axes))
-        wanted, allocation = np.empty((size, periods)), np.empty((size, periods, 3, thrusters))
+        allocation = np.empty((size, periods, rows_of(self._model), thrusters))
+        angles = np.empty((size, periods + 1, copy.attitude_error.shape[1]))
         for i in range(periods):
             self._world.allocate(copy.observation, allocation[:, i])
-            wanted[:, i] = -self.gains.heading_gain * copy.attitude_error[:, 0]
+            angles[:, i] = copy.attitude_error
             forces = allocation[:, i, : self._model.axes] * copy.read("force")[:, np.newaxis]
             thrust[:, i] = forces.sum(axis=2)
             copy.step(_action(plan[:, i], copy.limit))
             error[:, i] = copy.error
-        return Foreseen(error, thrust, wanted, allocation)
+        angles[:, periods] = copy.attitude_error
+        return Foreseen(error, thrust, self._wanted(angles), allocation)
+
+    def _wanted(self, angles: Array) -> Array:
+        """Wanted moments from the attitude errors, (batch, periods + 1, angles); see `signals`."""
+        model, now = self._model, angles[:, :-1].copy()
+        rate = np.diff(angles, axis=1) / model.h
+        if model.attitude_rate >= 0:
+            now += ATTITUDE_LEAD * rate
+        wanted = -self.gains.heading_gain * now
+        if model.watched:
+            damping = -ROLL_DAMPING * rate[:, :, model.angles]
+            wanted[:, :, model.angles] = np.clip(damping, -ROLL_LIMIT, ROLL_LIMIT)
+        return np.asarray(wanted)
 
     def _copy_of(self, snapshot: Any) -> Simulation:
         copy, scenarios = self._copy, snapshot.scenarios

@@ -10,12 +10,14 @@ from usm_baselines.estimation.navigator import Navigator, is_needed
 from usm_baselines.signals import model_of, sense, shared_size, signals_of
 
 from usm_gym.robot import Robot
+from usm_gym.spatial_robot import EELY
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
 
 DENSITIES = 2e-2, 0.05
 RARE = Nominal(Robot(), 0.02, 0.1, 1e-3, position_period=5)
 LATE = replace(RARE, position_delay=3)
+IN_SPACE = replace(LATE, robot=EELY)
 DVL = {"velocity_period": 4, "velocity_noise": 5e-3}
 
 
@@ -30,20 +32,21 @@ class Drifter:
             kalman.process_noise(damping, nominal.control_period, *DENSITIES)
             for damping in linear.damping
         ]
-        self.state = np.zeros((periods, robots, 2, 3))
+        axes = len(linear.damping)
+        self.state = np.zeros((periods, robots, axes, 3))
         first = np.diag([nominal.position_noise**2, 0.0, 10.0 * DENSITIES[1] ** 2])
-        for axis in range(2):
+        for axis in range(axes):
             A, Q = linear.transition[axis][:3, :3], noise[axis]
             x = rng.multivariate_normal(np.zeros(3), first, robots)
             for k in range(periods):
                 self.state[k, :, axis] = x
                 x = x @ A.T + rng.multivariate_normal(np.zeros(3), Q, robots)
         self.fixes = self.state[..., 0] + nominal.position_noise * rng.standard_normal(
-            (periods, robots, 2)
+            (periods, robots, axes)
         )
         # At the start the position is known, and what is estimated begins there.
         self.fixes[0] = 0.0
-        speed = rng.standard_normal((periods, robots, 2))
+        speed = rng.standard_normal((periods, robots, axes))
         self.speeds = self.state[..., 1] + nominal.velocity_noise * speed
         self.arrives = rng.random(periods) > 0.2
         self.arrives[0] = True
@@ -116,24 +119,27 @@ def test_late_measurements_give_the_estimate_of_those_in_time_run_on(more):
         np.testing.assert_allclose(P[k], P_run_on, rtol=1e-9, atol=1e-18)
 
 
-@pytest.mark.parametrize("nominal", [LATE, replace(LATE, **DVL, velocity_delay=2)])
+@pytest.mark.parametrize(
+    "nominal",
+    [LATE, replace(LATE, **DVL, velocity_delay=2), replace(IN_SPACE, **DVL, velocity_delay=2)],
+)
 def test_innovations_and_errors_are_as_large_as_the_navigator_says(nominal):
-    robots = 100
+    robots, axes = 100, len(world_of(nominal.robot).axes)
     drifter = Drifter(nominal, robots, periods=400, seed=2)
     estimate, P, innovation, variance = navigated(drifter, nominal)
     arrived = variance[:, 0, 0] > 0.0
     assert 20 < arrived.sum() < 400 / nominal.position_period
     squares = (innovation[arrived] ** 2 / variance[arrived]).sum(axis=(1, 2))
-    low, high = chi2.ppf([0.025, 0.975], 2 * robots)
+    low, high = chi2.ppf([0.025, 0.975], axes * robots)
     inside = np.mean((squares > low) & (squares < high))
     assert inside > 0.85
-    low, high = chi2.ppf([0.001, 0.999], 2 * robots * arrived.sum())
+    low, high = chi2.ppf([0.001, 0.999], axes * robots * arrived.sum())
     assert low < squares.sum() < high
     # The same of the estimates, at instants far apart.
     for k in (50, 199, 399):
-        off = (estimate[k] - drifter.state[k]).reshape(robots, 6)
+        off = (estimate[k] - drifter.state[k]).reshape(robots, 3 * axes)
         square = np.einsum("bi,bij,bj->", off, np.linalg.inv(P[k]), off)
-        low, high = chi2.ppf([0.001, 0.999], 6 * robots)
+        low, high = chi2.ppf([0.001, 0.999], 3 * axes * robots)
         assert low < square < high
 
 

@@ -12,6 +12,7 @@ from usm_gym import Robot, evaluate
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.sampling import sample
+from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
 H, LAG, DAMPING = 0.02, 0.05, 0.4
@@ -89,7 +90,7 @@ def signals(y: float, u: float, started: float) -> Signals:
 def test_a_constant_disturbance_moves_nothing_in_the_end_and_the_loop_has_its_poles() -> None:
     nominal = Nominal(Robot(), H, 0.0, 5e-5)
     policy = usm_baselines.make("dob", nominal, observer_bandwidth=20.0, controller_bandwidth=2.0)
-    inertia, drag = kalman.straight_body(Robot())
+    inertia, drag = world_of(Robot()).straight_body
     T = kalman.sampled(drag[0] / inertia[0], 0.0, H)
     mass, d = policy._model.mass, 0.3
     x, own, force = np.array([0.05, 0.0, d, 0.0]), np.zeros((1, 2, 4)), np.zeros((1, 2))

@@ -16,6 +16,7 @@ from usm_gym import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.sampling import sample
+from usm_gym.world import world_of
 
 PERIODS, THRUSTERS, WEIGHT = 8, 5, 5e-5
 better: Any = improve
@@ -52,7 +53,7 @@ def test_where_limits_bind_it_keeps_them_and_mpc_does_not() -> None:
 
 def test_the_plan_is_the_best_of_all_changes_within_the_limits() -> None:
     # Independently: the dense least squares of `mpc`, with commands for changes of the force.
-    rng, inertia = np.random.default_rng(2), kalman.straight_body(Robot())[0]
+    rng, inertia = np.random.default_rng(2), world_of(Robot()).straight_body[0]
     transition = np.stack([kalman.sampled(damping, 0.05, 0.02) for damping in (0.3, 8.0)])
     moment, effort = MOMENT_WEIGHT * WEIGHT, EFFORT_WEIGHT * WEIGHT
     given = problem_of(transition, inertia, WEIGHT, moment, effort, changes=True)
@@ -78,6 +79,6 @@ def test_the_plan_is_the_best_of_all_changes_within_the_limits() -> None:
     plan = np.tile(last, (1, PERIODS, 1))
     held = np.tile(T[:2] @ last, (1, PERIODS, 1))
     allocation = np.tile(T, (1, PERIODS, 1, 1))
-    foreseen = Foreseen(free[np.newaxis].copy(), held, np.full((1, PERIODS), wanted), allocation)
+    foreseen = Foreseen(free[np.newaxis].copy(), held, np.full((1, PERIODS, 1), wanted), allocation)
     better(plan, np.array([4.0]), foreseen, given)
     assert np.sum((A @ plan.ravel() - b) ** 2) == pytest.approx(2.0 * best.cost, rel=1e-3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.estimation.prediction import ESTIMATES, NAMES
+from usm_baselines.estimation.prediction import NAMES
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import model_of, signals_of
 
@@ -39,10 +39,11 @@ class Labels:
             (robots, axes, 3); `missed`, called a period later, has to be added to the last.
         """
         self._then = state[:, self._columns].copy()
-        believed = self._then[:, :ESTIMATES].reshape(len(state), -1, len(NAMES))
+        estimates = self._predictor.estimates
+        believed = self._then[:, :estimates].reshape(len(state), -1, len(NAMES))
         true = np.stack([error, rate, np.zeros_like(rate)], axis=2)
         corrections = true - believed
-        self._then[:, :ESTIMATES] = true.reshape(len(state), ESTIMATES)
+        self._then[:, :estimates] = true.reshape(len(state), estimates)
         return corrections
 
     def missed(self, observation: NDArray[np.float32], rate: Array) -> Array:
