@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from usm_baselines.estimation.estimator import LEADS, Estimate
-from usm_baselines.estimation.prediction import NAMES
+from usm_baselines.estimation.foresight import NAMES
 from usm_baselines.policy import ScriptedPolicy
 
 from usm_agents.residual.observation import ResidualLayout, base_entries

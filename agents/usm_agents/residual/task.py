@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 from usm_baselines.contender import contender
 from usm_baselines.estimation.estimator import Estimate, Estimator, foreseen
-from usm_baselines.estimation.prediction import NAMES, believed
+from usm_baselines.estimation.foresight import NAMES
+from usm_baselines.estimation.prediction import believed
 from usm_baselines.policy import Percept, ScriptedPolicy, corrected
 from usm_baselines.signals import model_of, softness_of
 

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from usm_baselines.estimation import kalman, prediction
-from usm_baselines.estimation.foresight import estimates_of
+from usm_baselines.estimation import kalman
+from usm_baselines.estimation.foresight import NAMES, estimates_of
 from usm_baselines.estimation.kalman import DISTURBANCE, ERROR, RATE, STATES, THRUST
 from usm_baselines.estimation.prediction import Predictor, believed, held_force
 from usm_baselines.laws.lqg import LQG, regulate
@@ -88,7 +88,7 @@ class JointLQG(LQG):
     """LQG control that foresees the joint motion; it keeps the state of a `Predictor`."""
 
     Gains: type[Any] = JointLQGGains
-    state = prediction.NAMES
+    state = NAMES
     linear = False
 
     def __init__(self, nominal: Nominal, **gains: Any) -> None:

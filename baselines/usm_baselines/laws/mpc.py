@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from usm_baselines.estimation import kalman, prediction
+from usm_baselines.estimation import kalman
+from usm_baselines.estimation.foresight import NAMES
 from usm_baselines.estimation.kalman import COMMAND, ERROR, RATE, THRUST
 from usm_baselines.estimation.prediction import Predictor, believed, held_force
 from usm_baselines.policy import HEADING_GAIN, ScriptedPolicy
@@ -100,7 +101,7 @@ class MPC(ScriptedPolicy):
     """
 
     Gains = MPCGains
-    state = prediction.NAMES
+    state = NAMES
     shown = ("rate", "unmodelled")
     knows_lag = True
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from usm_baselines.estimation.prediction import NAMES
+from usm_baselines.estimation.foresight import NAMES
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import model_of, signals_of
 
