@@ -14,12 +14,12 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from usm_agents.residual.env import ResidualVectorEnv
-from usm_gym.envs.usm import USMVectorEnv
+from usm_gym.envs.vector_env import TrackingVectorEnv
 from usm_gym.support.validation import require
 
 
 class SB3VecEnv(VecEnv):
-    """The robots of a `USMVectorEnv`, or of the residual task on one, as Stable-Baselines3 wants.
+    """The robots of a vector environment, or of the residual task on one, for Stable-Baselines3.
 
     Episodes restart within the step that ends them. The info of a step that ends an episode has
     everything: the environment's own keys, `terminal_observation`, `TimeLimit.truncated`, and
@@ -46,13 +46,10 @@ class SB3VecEnv(VecEnv):
             ValueError: If it is of another package, or does not restart episodes within a step.
         """
         plain = envs.unwrapped
-        require(
-            isinstance(plain, USMVectorEnv) and isinstance(envs, (USMVectorEnv, ResidualVectorEnv)),
-            "envs",
-            envs,
-            "a USMVectorEnv, or a ResidualVectorEnv around one",
-        )
-        assert isinstance(plain, USMVectorEnv)
+        ours = isinstance(envs, (TrackingVectorEnv, ResidualVectorEnv))
+        allowed = "a TrackingVectorEnv, such as USMVectorEnv, or a ResidualVectorEnv around one"
+        require(ours and isinstance(plain, TrackingVectorEnv), "envs", envs, allowed)
+        assert isinstance(plain, TrackingVectorEnv)
         require(
             plain.autoreset_mode is AutoresetMode.SAME_STEP,
             "autoreset_mode",
