@@ -169,5 +169,5 @@ def test_other_environments_are_refused():
     envs = gym.make_vec(ID, num_envs=2, vectorization_mode="vector_entry_point")
     with pytest.raises(ValueError, match="autoreset_mode is 'NextStep'"):
         SB3VecEnv(envs)
-    with pytest.raises(ValueError, match="a USMVectorEnv"):
+    with pytest.raises(ValueError, match="a TrackingVectorEnv"):
         SB3VecEnv(gym.make_vec("CartPole-v1", num_envs=2, vectorization_mode="vector_entry_point"))
