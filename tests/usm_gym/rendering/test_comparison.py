@@ -13,10 +13,13 @@ from usm_gym.rendering.comparison import (
     measured,
     scored_distances,
 )
+from usm_gym.rendering.depiction import depiction_of
 from usm_gym.rendering.look import HEAD, WATER
-from usm_gym.rendering.picture import Recorder, drift, velocity
+from usm_gym.rendering.picture import drift, velocity
+from usm_gym.rendering.space.camera import View, following
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
+from usm_gym.task.spatial_sampling import nominal_in_space
 from usm_gym.task.water import Water
 
 SCENARIO = dataclasses.replace(usm_gym.suite("operation-basin")[4], duration=3.0, settle_time=1.0)
@@ -24,12 +27,12 @@ SCENARIO = dataclasses.replace(usm_gym.suite("operation-basin")[4], duration=3.0
 
 def picture(steps, thrust=0.0, scenario=SCENARIO):
     """A picture after some control periods of constant thrust, and the errors on the way."""
-    simulation, recorder = Simulation([scenario]), Recorder()
+    simulation, recorder = Simulation([scenario]), depiction_of(scenario.body).recorder()
     errors = []
     for _ in range(steps):
         recorder.note(simulation)
         errors.append(simulation.error[0].copy())
-        simulation.step(np.full((1, 5), thrust))
+        simulation.step(np.full((1, simulation.world.thrusters), thrust))
     errors.append(simulation.error[0].copy())
     return recorder.picture(simulation), np.array(errors)
 
@@ -39,9 +42,9 @@ def where(frame, colour, tolerance=6):
     return np.argwhere(np.abs(frame.astype(int) - colour).max(axis=2) <= tolerance)
 
 
-def compared(pictures, width=480):
+def compared(pictures, width=480, scenario=SCENARIO):
     captions = [Caption(str(k), "position only") for k in range(len(pictures))]
-    return Comparison(width, captions, pictures, 1.0).draw(pictures)
+    return Comparison(width, captions, scenario, pictures, 1.0).draw(pictures)
 
 
 def test_what_is_read_out_is_the_distance_after_settling():
@@ -91,10 +94,27 @@ def test_every_policy_has_its_own_robot_below_the_last(count):
     assert len(where(frame, WATER, 0)) > 10_000
 
 
+def test_robots_in_space_stand_beside_their_errors_as_the_camera_sees_them():
+    scenario = dataclasses.replace(nominal_in_space("torpedo3d"), duration=3.0, settle_time=1.0)
+    shown = [picture(60, thrust, scenario)[0] for thrust in (0.0, 1.0)]
+    frame = compared(shown, scenario=scenario)
+    red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
+    heads = np.argwhere(((red - blue > 70) & (green > 0.6 * red))[:340])  # above the chart
+    assert len(np.flatnonzero(np.diff(np.unique(heads[:, 0])) > 20)) == 1  # one above the other
+    for each, colour in zip(shown, COLOURS, strict=False):
+        goal = View(following(each), (0, 0), 1.0, 0.1)
+        right = goal.turned(each.errors[-1])[0]
+        spots = where(frame, colour)
+        lens = spots[(spots[:, 1] > 370) & (spots[:, 0] < 340)]  # to the right, above the chart
+        assert len(lens) > 3
+        # The goal is in the middle of the lens, 413 points from the left.
+        assert np.sign(np.median(lens[:, 1]) - 413) in (0, np.sign(right))
+
+
 @pytest.mark.parametrize("width", [380, 480, 719])
 def test_sizes_suit_an_encoder(width):
     shown, _ = picture(3)
-    comparison = Comparison(width, [Caption("a"), Caption("b")], [shown] * 2, 1.0)
+    comparison = Comparison(width, [Caption("a"), Caption("b")], SCENARIO, [shown] * 2, 1.0)
     assert comparison.draw([shown] * 2).shape == (comparison.size[1], width, 3)
     assert comparison.size[1] % 2 == 0
 
