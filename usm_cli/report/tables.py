@@ -27,6 +27,7 @@ from usm_cli.score_table import combined_error
 from usm_gym.statistics import FEWEST_EPISODES, told_apart
 from usm_gym.support.text import degrees, figures, mm
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.spatial_scenario import SpatialScenario
 
 Row = TypeVar("Row", bound=Scores)
 CONDITIONS = (
@@ -178,7 +179,9 @@ def paper_table(result: ReproductionResult) -> SortableTable:
     return SortableTable(columns, body)
 
 
-def conditions_table(suites: Mapping[str, Sequence[Scenario]]) -> SortableTable:
+def conditions_table(
+    suites: Mapping[str, Sequence[Scenario | SpatialScenario]],
+) -> SortableTable:
     """The conditions of the episodes of suites, one row per suite."""
     body = []
     for name, scenarios in suites.items():
