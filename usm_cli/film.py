@@ -13,9 +13,10 @@ import imageio_ffmpeg
 import numpy as np
 
 from usm_cli.take import Take
-from usm_gym.rendering.canvas import Canvas, Frame
 from usm_gym.rendering.chart import error_scale
 from usm_gym.rendering.comparison import Caption, Comparison
+from usm_gym.rendering.depiction import AnyCanvas, depiction_of
+from usm_gym.rendering.look import Frame
 from usm_gym.rendering.window import Window
 from usm_gym.support.files import replacing
 
@@ -62,13 +63,15 @@ class Film:
             speed: Of the film, times real time.
         """
         self._takes, self._name = takes, names[0]
-        self._canvas: Canvas | Comparison
+        self._canvas: AnyCanvas | Comparison
         last = [take.pictures[-1] for take in takes]
+        scenario = takes[0].trajectory.scenario
         if len(takes) == 1:
-            self._canvas, self._scale = Canvas(width), error_scale(last[0].errors)
+            self._canvas = depiction_of(scenario.body).canvas(width)
+            self._scale = error_scale(last[0].errors)
         else:
             captions = [Caption(name, take.told) for name, take in zip(names, takes, strict=True)]
-            self._canvas = Comparison(width, captions, last, speed)
+            self._canvas = Comparison(width, captions, scenario, last, speed)
         self.size = self._canvas.size
         self.length = length
 

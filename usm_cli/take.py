@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from usm_baselines.contender import Contender
 
 from usm_gym.evaluation import Trajectory, rollout
-from usm_gym.rendering.picture import Picture, Recorder
+from usm_gym.rendering.depiction import depiction_of
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError, in_one_line
-from usm_gym.task.modes import AnyScenario
+from usm_gym.world import Episode
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,11 @@ class Take:
 
     name: str
     told: str
-    pictures: list[Picture]
+    pictures: list[Any]
     trajectory: Trajectory
 
 
-def instants(scenario: AnyScenario, fps: float, speed: float) -> list[int]:
+def instants(scenario: Episode, fps: float, speed: float) -> list[int]:
     """The control instants that the frames of an episode show, played `speed` times real time."""
     frames = max(1, round(fps * scenario.duration / speed))
     times = np.arange(frames + 1) * (speed / fps)
@@ -43,7 +44,7 @@ def instants(scenario: AnyScenario, fps: float, speed: float) -> list[int]:
 
 def take(
     contender: Contender,
-    scenario: AnyScenario,
+    scenario: Episode,
     shown: Sequence[int],
     progress: Callable[[float], None] = lambda episodes: None,
 ) -> Take:
@@ -58,8 +59,8 @@ def take(
     Raises:
         ValueError: If the policy cannot be made or fails to act.
     """
-    recorder, wanted = Recorder(), set(shown)
-    seen: dict[int, Picture] = {}
+    recorder, wanted = depiction_of(scenario.body).recorder(), set(shown)
+    seen: dict[int, Any] = {}
     lost = False
 
     def watch(simulation: Simulation) -> None:

@@ -21,9 +21,15 @@ from usm_cli import film
 from usm_cli.program import main
 from usm_cli.take import instants, take
 from usm_gym.rendering.window import _windows
+from usm_gym.task.spatial_sampling import nominal_in_space
+from usm_gym.task.spatial_scenario import SpatialPath
 
 USM = Path(sys.executable).with_name("usm")
 SHORT = dataclasses.replace(usm_gym.suite("operation")[1], duration=2.0, settle_time=0.5)
+
+IN_SPACE = dataclasses.replace(
+    nominal_in_space("operation3d"), duration=1.0, settle_time=0.5, path=SpatialPath(speed=0.2)
+)
 
 
 def usm(*arguments, **options):
@@ -93,6 +99,24 @@ def test_two_policies_meet_the_same_scenario_and_noise():
     assert all((a.current == b.current).all() for a, b in zip(first, second, strict=True))
     assert (first[-1].errors != second[-1].errors).any()
     np.testing.assert_allclose(first[-1].errors[1:], takes[0].trajectory.error, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("names", "suffix", "width", "size"),
+    [(["pd"], ".mp4", 320, (320, 240)), (["pd", "sta"], ".gif", 240, (240, 268))],
+)
+def test_a_robot_in_space_is_filmed_as_one_in_the_plane(names, suffix, width, size, output):
+    shown = instants(IN_SPACE, 12.5, 2.0)
+    takes = [take(contender(name), IN_SPACE, shown) for name in names]
+    made = film.Film(takes, names, len(shown), width, speed=2.0)
+    path = output.with_suffix(suffix)
+    film.write(made, path, 12.5)
+    about, images = probe(path)
+    assert about["size"] == size
+    assert len(images) == len(shown) == 7
+    assert (images[0] != images[-1]).any()
+    errors, expected = takes[0].pictures[-1].errors[1:], takes[0].trajectory.error
+    np.testing.assert_allclose(errors, expected[: len(errors)], atol=1e-15)
 
 
 def test_frames_keep_time_at_any_speed():

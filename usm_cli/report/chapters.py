@@ -24,7 +24,7 @@ from usm_baselines.registry import ids
 
 from usm_cli.report import plots
 from usm_cli.report.blocks import Chapter, Facts, Plot, Replay, Tables
-from usm_cli.report.replay import PLANE, differing, recorded, replayed
+from usm_cli.report.replay import differing, recorded, replayed
 from usm_cli.report.tables import (
     by_objective,
     competes,
@@ -43,8 +43,8 @@ from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
 from usm_gym.task.modes import AnyScenario
-from usm_gym.task.scenario import Scenario
 from usm_gym.task.stored_scenario import OtherScenario
+from usm_gym.world import world_of
 
 Progress = Callable[[int, int], object]
 
@@ -294,18 +294,12 @@ def advice(tiers: Mapping[str, Mapping[str, CompetitorScores]]) -> list[Tables]:
 def conditions(
     label: str, name: str, scenarios: Sequence[AnyScenario | OtherScenario], besides: str = ""
 ) -> list[Tables]:
-    """The conditions of a result, if its scenarios are of the planar robot."""
-    planar = planar_only(scenarios)
-    if not planar:
+    """The conditions of a result, if its scenarios are of a robot of this package."""
+    known = [scenario for scenario in scenarios if not isinstance(scenario, OtherScenario)]
+    if len(known) < len(scenarios):
         return []
-    table = {name: conditions_table({name: planar})}
+    table = {name: conditions_table({name: known})}
     return [Tables("Conditions", CONDITIONS + besides, label, table)]
-
-
-def planar_only(scenarios: Sequence[AnyScenario | OtherScenario]) -> list[Scenario]:
-    """The scenarios, if all are of the planar robot; otherwise none."""
-    planar = [scenario for scenario in scenarios if isinstance(scenario, Scenario)]
-    return planar if len(planar) == len(scenarios) else []
 
 
 def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
@@ -332,12 +326,11 @@ def replay(
     index = choice.scenario
     require(index < len(scenarios), "--scenario", index, f"0 to {len(scenarios) - 1}")
     title = f"Episode {index}, replayed"
-    planar = planar_only(scenarios)
-    if not planar or (axes and tuple(axes) != PLANE):
-        plane = f"a replay draws a robot in the plane of {listed(PLANE)}"
-        return Facts("Replay", {"none": f"{plane}, and this result is in {listed(axes)}"})
+    scenario, done = scenarios[index], 0
+    if isinstance(scenario, OtherScenario) or not in_axes(scenario, axes):
+        known = "a replay draws robots of this package"
+        return Facts("Replay", {"none": f"{known}, and this result is in {listed(axes)}"})
     contenders, missing = able(rows, choice)
-    scenario, done = planar[index], 0
 
     def advance() -> None:
         nonlocal done
@@ -360,6 +353,11 @@ def replay(
     others = [name for name in shown if name != best]
     beside = PAPERS if PAPERS in others else others[0] if others else ""
     return Replay(title, in_words(scenario), episodes.data, (best, beside), notes)
+
+
+def in_axes(scenario: AnyScenario, axes: Sequence[str]) -> bool:
+    """Whether the errors of a result are in the axes of its scenario, if it has any."""
+    return not axes or tuple(axes) == world_of(scenario.body).axes
 
 
 def episode_errors(

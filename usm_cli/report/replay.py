@@ -1,7 +1,4 @@
-"""Computes episodes for a page again, thins them out and packs them.
-
-The page plays a chain of links in a plane; results with other axes have no replay.
-"""
+"""Computes episodes for a page again, thins them out and packs them."""
 
 from __future__ import annotations
 
@@ -15,17 +12,18 @@ from numpy.typing import NDArray
 from usm_baselines.contender import Contender
 from usm_baselines.paper.paper_rate import Record
 
+from usm_cli.report.stage import stage_of
 from usm_cli.take import instants, take
 from usm_gym.evaluation import score
 from usm_gym.support import parallel
 from usm_gym.support.validation import UsageError
 from usm_gym.task.metrics import MAX_ERROR
+from usm_gym.task.modes import AnyScenario
 from usm_gym.task.scenario import Scenario
+from usm_gym.world import world_of
 
 Array = NDArray[np.float64]
 
-# The axes of the plane that the page draws.
-PLANE = ("x", "y")
 # Pictures of the robot per second; errors and thrust are kept at every control instant.
 FPS = 10.0
 # The time between two errors and efforts that are kept of a record at the paper's step, s.
@@ -41,8 +39,8 @@ class Acted:
 
     Attributes:
         data: The data that the page plays.
-        reference: Link angles of the reference posture, rad, (pictures, links).
-        current: Velocity of the water, m/s, (pictures, 2).
+        reference: Reference postures, (pictures, numbers).
+        current: Velocity of the water, m/s, (pictures, axes).
         max_error: Largest error after settling in each axis, m.
     """
 
@@ -77,7 +75,7 @@ def packed(values: Array) -> dict[str, Any]:
 
 def replayed(
     contenders: Sequence[Contender],
-    scenario: Scenario,
+    scenario: AnyScenario,
     workers: int,
     progress: Callable[[], object],
 ) -> Episodes:
@@ -121,15 +119,16 @@ def replayed(
     return Episodes(data, errors, missing)
 
 
-def act(contender: Contender, scenario: Scenario) -> Acted | str:
+def act(contender: Contender, scenario: AnyScenario) -> Acted | str:
     """Let a policy act in a scenario, or say why it cannot."""
     try:
         acted = take(contender, scenario, instants(scenario, FPS, 1.0))
     except UsageError as error:
         return str(error)
     pictures, row = acted.pictures, score(acted.trajectory)
+    stage, axes = stage_of(scenario.body), world_of(scenario.body).axes
     data = {
-        "theta": packed(np.array([picture.body.angles for picture in pictures])),
+        "posture": packed(stage.postures(pictures)),
         "thrust": packed(np.array([picture.thrust for picture in pictures])),
         "error": packed(pictures[-1].errors[1:]),
         "effort": packed(np.abs(acted.trajectory.command).mean(axis=1)),
@@ -137,9 +136,9 @@ def act(contender: Contender, scenario: Scenario) -> Acted | str:
     }
     return Acted(
         data,
-        np.array([picture.reference.angles for picture in pictures]),
+        stage.references(pictures),
         np.array([picture.current for picture in pictures]),
-        tuple(float(row[MAX_ERROR + axis]) for axis in PLANE),
+        tuple(float(row[MAX_ERROR + axis]) for axis in axes),
     )
 
 
@@ -155,7 +154,7 @@ def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any
         "reference": None,
         "episodes": {
             name: {
-                "theta": packed(record.theta[::sparse]),
+                "posture": packed(record.theta[::sparse]),
                 "thrust": None,
                 "error": packed(record.error[::every]),
                 "effort": packed(record.effort[::every]),
@@ -166,23 +165,18 @@ def recorded(scenario: Scenario, records: Mapping[str, Record]) -> dict[str, Any
     }
 
 
-def frame(scenario: Scenario, path: Array) -> dict[str, Any]:
-    """The data that all policies of a scenario share; path: at every picture, m, (k, 2)."""
-    robot = scenario.body
+def frame(scenario: AnyScenario, path: Array) -> dict[str, Any]:
+    """The data that all policies of a scenario share; path: at every picture, m, (k, axes)."""
+    stage = stage_of(scenario.body)
     return {
+        "view": stage.view,
+        "axes": list(world_of(scenario.body).axes),
         "duration": scenario.duration,
         "settle": scenario.settle_time,
         "shifts": list(scenario.shifts),
         "limit": scenario.conditions.thruster_limit,
         "frame": 1.0 / FPS,
-        "robot": {
-            "length": robot.link_length,
-            "halfWidth": robot.half_width,
-            "thrusters": [
-                {"link": thruster.link - 1, "normal": thruster.direction == "normal"}
-                for thruster in robot.thrusters
-            ],
-        },
+        "robot": stage.robot(),
         "path": packed(path),
     }
 

@@ -12,7 +12,8 @@ from usm_baselines.registry import base_of, entry, ids
 from usm_cli.report.tables import competes
 from usm_cli.score_table import combined_error, conclusion
 from usm_gym.support.text import counted, figures, listed
-from usm_gym.task.scenario import Scenario
+from usm_gym.task.modes import AnyScenario
+from usm_gym.task.spatial_scenario import SpatialScenario
 
 # The paper's controller, with which the best one is compared.
 PAPERS = "sta"
@@ -63,15 +64,12 @@ def verdict(rows: Mapping[str, Scores]) -> str:
     return said
 
 
-def in_words(scenario: Scenario) -> str:
+def in_words(scenario: AnyScenario) -> str:
     """Describe a scenario in a sentence or two."""
     path, water, conditions = scenario.path, scenario.water, scenario.conditions
     parts = [f"{scenario.mode} mode, {scenario.duration:g} s, at {100 * path.speed:.1f} cm/s"]
     if scenario.shifts:
-        bends = zip(scenario.inspection.deflections, scenario.shifts, strict=True)
-        turned = listed([f"{math.degrees(angle):+.0f}° at {time:.1f} s" for angle, time in bends])
-        turned = turned.replace("-", "−")
-        parts.append(f"the last {scenario.inspection.bending_joints} joints bend by {turned}")
+        parts.append(bends(scenario))
     current = sum(speed**2 for speed in water.current) ** 0.5
     parts.append(f"current {100 * current:.1f} cm/s")
     low, high = min(water.coefficients), max(water.coefficients)
@@ -79,6 +77,27 @@ def in_words(scenario: Scenario) -> str:
     parts.append(f"position noise {1e3 * conditions.position_noise:g} mm")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
+
+
+def bends(scenario: AnyScenario) -> str:
+    """Say how the joints move, and when."""
+    if isinstance(scenario, SpatialScenario):
+        scan = scenario.scan
+        looks = [direction(*angles) for angles in zip(scan.pans, scan.tilts, strict=True)]
+        seen = zip(looks, scan.times, strict=True)
+        return f"the head looks {listed([f'{look} at {time:.1f} s' for look, time in seen])}"
+    inspection = scenario.inspection
+    at = zip(inspection.deflections, inspection.times, strict=True)
+    turned = listed([f"{math.degrees(angle):+.0f}° at {time:.1f} s" for angle, time in at])
+    return f"the last {inspection.bending_joints} joints bend by {turned.replace('-', '−')}"
+
+
+def direction(pan: float, tilt: float) -> str:
+    """Say where a head looks that is turned to the left and up by angles, rad."""
+    left, up = round(math.degrees(pan)), round(math.degrees(tilt))
+    parts = [f"{abs(left)}° to the {'left' if left > 0 else 'right'}"] if left else []
+    parts += [f"{abs(up)}° {'up' if up > 0 else 'down'}"] if up else []
+    return " and ".join(parts) or "ahead"
 
 
 def glossary(policies: Iterable[str]) -> dict[str, str]:

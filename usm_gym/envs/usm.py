@@ -114,7 +114,7 @@ window shows every step in real time (drawing needs the extra `render`) |
         """
         self.mode: Mode = mode_of(mode)
         self.conditions, self.robot = conditions_of(conditions), robot_of(robot)
-        viewer = None if render_mode is None else Viewer(render_mode)
+        viewer = None if render_mode is None else Viewer(self.robot, render_mode)
         super().__init__(ModeSampler(self.mode, self.conditions, self.robot), viewer)
 
 
@@ -172,6 +172,8 @@ class USMVectorEnv(TrackingVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
         require(is_whole(render_index, 0, last), "render_index", render_index, f"0 to {last}")
         self.mode: Mode = mode_of(mode)
         self.conditions, self.robot = conditions_of(conditions), robot_of(robot)
-        viewer = None if render_mode is None else Viewer(render_mode, num_envs, render_index)
+        viewer = None
+        if render_mode is not None:
+            viewer = Viewer(self.robot, render_mode, num_envs, render_index)
         sampler = ModeSampler(self.mode, self.conditions, self.robot)
         super().__init__(num_envs, sampler, autoreset_mode, threads, viewer)

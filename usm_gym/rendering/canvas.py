@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 import pygame
-from numpy.typing import NDArray
 
 from usm_gym.rendering import legend
 from usm_gym.rendering.chart import Chart, error_scale, in_mm, measured
@@ -15,9 +14,12 @@ from usm_gym.rendering.look import (
     CURRENT,
     ERROR_COLOURS,
     GREY,
+    HEIGHT,
     INK,
     PAPER,
+    WIDTH,
     Colour,
+    Frame,
     Points,
 )
 from usm_gym.rendering.panel import LEFT, MIDDLE, RIGHT, Panel, write
@@ -28,14 +30,12 @@ from usm_gym.rendering.scene import (
     Lens,
     Scene,
     arrow,
+    latest,
 )
 from usm_gym.task.loss import LOST_ERROR
 from usm_gym.task.scenario import Scenario
 
-Frame = NDArray[np.uint8]
-
-# Everything is laid out on 640 x 480 points.
-WIDTH, HEIGHT = 640, 480
+# Places, points.
 SCENE = pygame.Rect(14, 52, 612, 262)
 LEGEND = 328
 CAPTIONS = 348
@@ -77,9 +77,8 @@ class Canvas:
         self._frame.blit(self._still, (0, 0))
         self._headline(picture, title)
         self._swimming(picture)
-        self._lens.draw(self._frame, picture, scale)
-        time = picture.instants * np.float64(picture.scenario.conditions.control_period)
-        self._chart.draw(self._frame, time, picture.errors)
+        self._lens.draw(self._frame, latest(picture), scale)
+        self._chart.draw(self._frame, picture.times, picture.errors)
         pixels = np.empty((self.size[1], self.size[0], 3), np.uint8)
         pygame.image.frombuffer(pixels.data, self.size, "RGB").blit(self._frame, (0, 0))
         return pixels

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import pygame
 
-from usm_gym.rendering.canvas import Frame
 from usm_gym.rendering.chart import error_scale
+from usm_gym.rendering.depiction import depiction_of
 from usm_gym.rendering.look import (
     ALARM,
     CURRENT,
@@ -25,29 +25,19 @@ from usm_gym.rendering.look import (
     TRAIL,
     WATER,
     Colour,
+    Frame,
     Points,
 )
 from usm_gym.rendering.panel import LEFT, MIDDLE, RIGHT, Panel, write
-from usm_gym.rendering.picture import Picture
-from usm_gym.rendering.scene import (
-    GRID,
-    OUTLINE,
-    Lens,
-    Scene,
-    arrow,
-    cross_hair,
-    draw_jet,
-    thinned,
-)
+from usm_gym.rendering.picture import AnyPicture
+from usm_gym.rendering.scene import OUTLINE, arrow, cross_hair, draw_jet, thinned
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.scenario import Scenario
+from usm_gym.world import Episode
 
 # Everything is laid out on 480 points across.
 WIDTH, MARGIN = 480, 14
 HEAD, STRIP, WATERS, GAP, FOOT = 76, 42, 122, 8, 116
 ROW = STRIP + WATERS + GAP
-METRE = 140.0
-GOAL, LENS, LENS_RADIUS = (178.0, 60.0), (413.0, 51.0), 46.0
 CHART = pygame.Rect(42, 24, 424, 66)
 # Of the policies, from the top.
 COLOURS = (*ERROR_COLOURS, TRAIL)
@@ -77,13 +67,19 @@ class Comparison:
     """
 
     def __init__(
-        self, width: int, captions: Sequence[Caption], last: Sequence[Picture], speed: float
+        self,
+        width: int,
+        captions: Sequence[Caption],
+        scenario: Episode,
+        last: Sequence[AnyPicture],
+        speed: float,
     ) -> None:
         """Prepare frames.
 
         Args:
             width: Of a frame.
             captions: Of the policies, from the top.
+            scenario: Their scenario.
             last: Their last pictures, whose errors the scale fits.
             speed: Of the film, times real time.
         """
@@ -94,35 +90,32 @@ class Comparison:
         self._frame = pygame.Surface(self.size)
         scored = [scored_distances(each) for each in last]
         self._scale = error_scale(np.concatenate(scored))
-        self._ring = error_scale(np.array([np.quantile(each, USUAL) for each in scored]))
+        ring = error_scale(np.array([np.quantile(each, USUAL) for each in scored]))
         tops = [HEAD + row * ROW + STRIP for row in range(rows)]
         self._tops = tops
-        self._scenes, self._lenses = [], []
-        for top in tops:
-            area = pygame.Rect(MARGIN, top, WIDTH - 2 * MARGIN, WATERS)
-            goal, middle = np.add([GOAL, LENS], (0, top))
-            self._scenes.append(Scene(area, self._unit, METRE, goal))
-            self._lenses.append(Lens(middle, LENS_RADIUS, self._unit, WATER))
+        areas = [pygame.Rect(MARGIN, top, WIDTH - 2 * MARGIN, WATERS) for top in tops]
+        self._rows = depiction_of(scenario.body).rows(areas, self._unit, ring)
         self._frame.fill(PAPER)
-        self._heading(last[0].scenario, speed)
+        self._heading(scenario.conditions, speed)
         for row, caption in enumerate(captions):
             self._caption(caption, tops[row] - STRIP, COLOURS[row])
-        self._empty_chart(last[0].scenario)
+        self._empty_chart(scenario)
         self._still = self._frame.copy()
 
-    def draw(self, pictures: Sequence[Picture]) -> Frame:
+    def draw(self, pictures: Sequence[AnyPicture]) -> Frame:
         """Draw pictures of the policies: red, green and blue, (height, width, 3)."""
         self._frame.blit(self._still, (0, 0))
         time = max(picture.time for picture in pictures)
         self._text(f"{time:.0f} s", (WIDTH - MARGIN, 9), NORMAL, INK, RIGHT)
         for row, picture in enumerate(pictures):
-            self._row(row, picture)
+            self._rows[row].draw(self._frame, picture, COLOURS[row])
+            self._readout(picture, self._tops[row] - STRIP - 1, COLOURS[row])
         self._curves(pictures)
         pixels = np.empty((self.size[1], self.size[0], 3), np.uint8)
         pygame.image.frombuffer(pixels.data, self.size, "RGB").blit(self._frame, (0, 0))
         return pixels
 
-    def _heading(self, scenario: Scenario, speed: float) -> None:
+    def _heading(self, conditions: Conditions, speed: float) -> None:
         """Say what the goal is, and what the signs mean."""
         x = self._text("Hold", (MARGIN, 9), NORMAL, INK)
         x = self._sign("mass", x + 7, 20)
@@ -139,7 +132,7 @@ class Comparison:
         ):
             x = self._sign(kind, x, 43)
             x = self._text(words, (x + 4, 35), SMALL, GREY) + 8
-        words = f"{measured(scenario.conditions)}; {speed:g} times real time"
+        words = f"{measured(conditions)}; {speed:g} times real time"
         self._text(words, (MARGIN, 53), SMALL, GREY)
 
     def _sign(self, kind: str, x: float, y: float) -> float:
@@ -168,23 +161,12 @@ class Comparison:
         if caption.told:
             self._text(f"told: {caption.told}", (MARGIN + 12, top + 23), SMALL, GREY)
 
-    def _row(self, row: int, picture: Picture) -> None:
-        top, lens, colour = self._tops[row], self._lenses[row], COLOURS[row]
-        bar = None if row else np.array([MARGIN + 10 + GRID * METRE, top + WATERS - 6.0])
-        self._scenes[row].draw(self._frame, picture, colour, bar)
-        if bar is not None:
-            self._text(f"{GRID:g} m", (bar[0] + 5, bar[1] - 12), SMALL, GREY)
-        lens.draw(self._frame, picture, self._ring, colour)
-        magnified = float(f"{lens.reach / self._ring / METRE:.2g}")
-        self._text(f"error × {magnified:g}", (LENS[0], top + 101), SMALL, GREY, MIDDLE)
-        self._readout(picture, top - STRIP - 1, colour)
-
-    def _readout(self, picture: Picture, top: int, colour: Colour) -> None:
+    def _readout(self, picture: AnyPicture, top: int, colour: Colour) -> None:
         """Write how far the centre of mass is, or was at most, from its goal."""
         if picture.lost:
             self._text("lost", (WIDTH - MARGIN, top), LARGE, ALARM, RIGHT)
             return
-        scored = picture.time >= picture.scenario.settle_time
+        scored = picture.time >= picture.settle_time
         distance = float(scored_distances(picture).max() if scored else distances(picture)[-1])
         words = _mm(distance)
         shade = colour if scored else GREY
@@ -192,7 +174,7 @@ class Comparison:
         kind = "worst" if scored else "now"
         self._text(kind, (WIDTH - MARGIN - 104, top + 11), SMALL, GREY, RIGHT)
 
-    def _empty_chart(self, scenario: Scenario) -> None:
+    def _empty_chart(self, scenario: Episode) -> None:
         area = CHART.move(0, self._foot)
         words = "distance from the goal, mm (shaded: not scored)"
         self._text(words, (MARGIN, self._foot + 1), SMALL, GREY)
@@ -202,6 +184,7 @@ class Comparison:
             x = area.left + area.width * mark / scenario.duration
             align = MIDDLE if mark < scenario.duration else RIGHT
             self._text(f"{mark:g} s", (x, area.bottom + 4), SMALL, GREY, align)
+        self._duration = scenario.duration
         chart = self._chart = Panel(area.inflate(8, 8), self._unit)
         settled = round(area.width * min(1.0, scenario.settle_time / scenario.duration))
         chart.block(pygame.Rect(area.topleft, (settled, area.height)), WATER)
@@ -209,14 +192,12 @@ class Comparison:
             chart.line(np.array([[area.left, y], [area.right, y]]), 0.8, RULE)
         chart.keep()
 
-    def _curves(self, pictures: Sequence[Picture]) -> None:
+    def _curves(self, pictures: Sequence[AnyPicture]) -> None:
         area = CHART.move(0, self._foot)
         self._chart.clear()
         for picture, colour in zip(pictures, COLOURS, strict=False):
-            scenario = picture.scenario
-            time = picture.instants * scenario.conditions.control_period
             heights = np.minimum(distances(picture) / self._scale, 1.0) * area.height
-            across = area.left + area.width * time / scenario.duration
+            across = area.left + area.width * picture.times / self._duration
             curve = np.stack([across, area.bottom - heights], axis=1)
             self._chart.line(thinned(curve), 1.5, colour)
             self._chart.disc(curve[-1], 2.5, colour)
@@ -228,15 +209,14 @@ class Comparison:
         return write(self._frame, self._unit, text, at, size, colour, align)
 
 
-def distances(picture: Picture) -> Points:
+def distances(picture: AnyPicture) -> Points:
     """Distances of the centre of mass from its goal so far, m, (k,)."""
-    return np.asarray(np.hypot(*picture.errors.T))
+    return np.asarray(np.linalg.norm(picture.errors, axis=1))
 
 
-def scored_distances(picture: Picture) -> Points:
+def scored_distances(picture: AnyPicture) -> Points:
     """Those that count, m, or all if there are none yet."""
-    time = picture.instants * picture.scenario.conditions.control_period
-    late = time >= picture.scenario.settle_time
+    late = picture.times >= picture.settle_time
     return distances(picture)[late] if late.any() else distances(picture)
 
 

@@ -7,7 +7,19 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pygame
 
-from usm_gym.rendering.look import GREY, HEAD, HEAD_EDGE, HEAD_LINK, INK, LINK, TRAIL, Points
+from usm_gym.rendering.look import (
+    GREY,
+    HEAD,
+    HEAD_EDGE,
+    HEAD_LINK,
+    INK,
+    LINK,
+    REFERENCE,
+    TRAIL,
+    WANTED,
+    Points,
+    faded,
+)
 from usm_gym.rendering.panel import Panel, write
 from usm_gym.rendering.scene import OUTLINE, cross_hair, draw_jet
 
@@ -58,6 +70,13 @@ def reference(panel: Panel, ends: Points) -> None:
     """Draw the outline of a reference."""
     size = (0.5 * (ends[1, 0] - ends[0, 0]), 5.0)
     panel.outline(ends.mean(axis=0) + LINK * size, 1.5, OUTLINE)
+
+
+def wanted(panel: Panel, ends: Points) -> None:
+    """Draw a pose that is asked for."""
+    size = (0.5 * (ends[1, 0] - ends[0, 0]), 4.5)
+    colour = faded(REFERENCE, WANTED)
+    panel.shape(ends.mean(axis=0) + LINK * size, colour, colour)
 
 
 def thrust(panel: Panel, ends: Points, length: float | None = None) -> None:

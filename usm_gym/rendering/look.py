@@ -10,6 +10,11 @@ from usm_gym.robot import Robot
 
 Points = NDArray[np.float64]
 Colour = tuple[int, int, int]
+# Red, green and blue, (height, width, 3).
+Frame = NDArray[np.uint8]
+
+# Frames of one robot are laid out on so many points.
+WIDTH, HEIGHT = 640, 480
 
 INK, PAPER = (38, 50, 56), (255, 255, 255)
 # The colours of Okabe and Ito, which colour-blind people can tell apart, and tints of them.
@@ -24,6 +29,8 @@ CURRENT = (70, 130, 160)
 REFERENCE = (196, 120, 164)
 TRAIL = (0, 140, 105)
 ALARM = (176, 36, 24)
+# How much of the ground a pose that is asked for covers.
+WANTED = 0.32
 
 
 def faded(colour: Colour, share: float, ground: Colour = WATER) -> Colour:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,36 @@ from numpy.typing import NDArray
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.task.scenario import Scenario
+from usm_gym.task.spatial_water import SpatialWater
 from usm_gym.task.water import Water
 
 Array = NDArray[np.float64]
 # A lost robot may be anywhere; it is shown at most this far from its reference, m.
 FAR = 10.0
+
+
+class AnyPicture(Protocol):
+    """What films and charts ask of a picture of any world; `Picture` has the words."""
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+
+    @property
+    def times(self) -> Array:
+        """The instants recorded so far, in ascending order, s, (n,); the last one is now."""
+
+    @property
+    def errors(self) -> Array:
+        """True position errors at these instants, m, (n, axes)."""
+
+    @property
+    def settle_time(self) -> float:
+        """When the scored part of the episode begins, s."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether the robot is lost."""
 
 
 @dataclass(frozen=True)
@@ -63,28 +89,50 @@ class Picture:
     max_error: Array
     lost: bool
 
+    @property
+    def times(self) -> Array:
+        """The instants recorded so far, s, (len(instants),)."""
+        return self.instants * np.float64(self.scenario.conditions.control_period)
 
-class Recorder:
-    """Records the past of one robot of a simulation, for pictures with a trail."""
+    @property
+    def settle_time(self) -> float:
+        """When the scored part of the episode begins, s."""
+        return self.scenario.settle_time
+
+
+class Trail:
+    """Records the errors of one robot of a simulation along its path.
+
+    Attributes:
+        index: Which robot it is.
+    """
 
     def __init__(self, index: int = 0) -> None:
         """Follow the robot `index`."""
-        self._index = index
-        self._scenario: Scenario | None = None
+        self.index = index
+        self._scenario: Any = None
 
     def note(self, simulation: Simulation) -> None:
         """Record the present; call it at every control instant that a trail should show."""
-        scenario, count = simulation.scenarios[self._index], simulation.count[self._index]
+        scenario, count = simulation.scenarios[self.index], simulation.count[self.index]
         if scenario is not self._scenario or count == 0:
             self._scenario = scenario
             self._path = scenario.reference_positions()
             self._errors = np.full_like(self._path, np.nan)
-        self._errors[count] = simulation.error[self._index]
+        self._errors[count] = simulation.error[self.index]
+
+    def _recorded(self, count: int) -> NDArray[np.int64]:
+        """The instants recorded up to one of them."""
+        return np.flatnonzero(np.isfinite(self._errors[: count + 1, 0]))
+
+
+class Recorder(Trail):
+    """Records the past of one robot of a simulation, for pictures with a trail."""
 
     def picture(self, simulation: Simulation) -> Picture:
         """Describe the present."""
         self.note(simulation)
-        index, scenario = self._index, simulation.scenarios[self._index]
+        index, scenario = self.index, simulation.scenarios[self.index]
         robot = scenario.body
         count = int(simulation.count[index])
         here = self._path[count]
@@ -92,7 +140,7 @@ class Recorder:
         position = np.nan_to_num(simulation.read("position")[index])
         position = np.clip(position, here - FAR, here + FAR)
         wanted = reference_angles(simulation, index)
-        instants = np.flatnonzero(np.isfinite(self._errors[: count + 1, 0]))
+        instants = self._recorded(count)
         return Picture(
             robot=robot,
             scenario=scenario,
@@ -120,27 +168,27 @@ def reference_angles(simulation: Simulation, index: int) -> Array:
     return np.asarray(shape - own + heading - simulation.attitude_error[index])
 
 
-def velocity(water: Water, time: float) -> Array:
-    """Velocity of the water, m/s, (2,); a simulation has none before its first step."""
+def velocity(water: Water | SpatialWater, time: float) -> Array:
+    """Velocity of the water, m/s, (axes,); a simulation has none before its first step."""
     moving = np.array(water.current)
     for amplitude, phase, frequency in _sinusoids(water):
         moving += amplitude * np.sin(phase + frequency * time)
     return moving
 
 
-def drift(water: Water, time: float) -> Array:
-    """How far the water has moved since the start, m, (2,)."""
+def drift(water: Water | SpatialWater, time: float) -> Array:
+    """How far the water has moved since the start, m, (axes,)."""
     moved = np.array(water.current) * time
     for amplitude, phase, frequency in _sinusoids(water):
         moved += amplitude * (np.cos(phase) - np.cos(phase + frequency * time)) / frequency
     return moved
 
 
-def _sinusoids(water: Water) -> list[tuple[Array, Array, float]]:
-    """Amplitudes, m/s, (2,), phases at the start, (2,), and frequency, rad/s."""
+def _sinusoids(water: Water | SpatialWater) -> list[tuple[Array, Array, float]]:
+    """Amplitudes, m/s, (axes,), phases at the start, (axes,) or the same, frequency, rad/s."""
     slow = (np.array(water.amplitude), np.array(water.phase), 2 * np.pi / water.period)
     waves = [
-        (np.array(wave.amplitude), np.full(2, wave.phase), 2 * np.pi / wave.period)
+        (np.array(wave.amplitude), np.array(wave.phase), 2 * np.pi / wave.period)
         for wave in water.waves
     ]
     return [slow, *waves]

@@ -28,7 +28,7 @@ from usm_gym.rendering.look import (
     outlines,
 )
 from usm_gym.rendering.panel import Panel
-from usm_gym.rendering.picture import Picture, drift
+from usm_gym.rendering.picture import AnyPicture, Picture, drift
 
 GRID = 0.5
 # Length of a jet at the thruster's limit, m.
@@ -184,11 +184,10 @@ class Lens:
         panel.keep()
 
     def draw(
-        self, frame: pygame.Surface, picture: Picture, scale: float, colour: Colour = TRAIL
+        self, frame: pygame.Surface, errors: Points, scale: float, colour: Colour = TRAIL
     ) -> None:
-        """Draw the error and its last past on a frame; `scale`, m, is at the outer ring."""
-        past = round(LENS_PAST / picture.scenario.conditions.control_period)
-        marks = picture.errors[-past:] / scale
+        """Draw the error and its last past, m, (n, 2), on a frame; `scale` is at the outer ring."""
+        marks = errors / scale
         marks /= np.maximum(np.hypot(*marks.T), 1.0)[:, np.newaxis]
         points = self._middle + self.reach * marks * (1, -1)
         self._panel.clear()
@@ -196,6 +195,11 @@ class Lens:
         arrow(self._panel, self._middle, points[-1], 2.2, colour)
         self._panel.centre_of_mass(points[-1])
         self._panel.show(frame)
+
+
+def latest(picture: AnyPicture) -> Points:
+    """The errors that a lens shows, m, (n, axes)."""
+    return picture.errors[picture.times > picture.time - LENS_PAST]
 
 
 def cross_hair(panel: Panel, at: Points, size: float = 1.0) -> None:

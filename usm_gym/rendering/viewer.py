@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
-import numpy as np
-from numpy.typing import NDArray
 
-from usm_gym.rendering.picture import Recorder
+from usm_gym.rendering.depiction import AnyCanvas, depiction_of
+from usm_gym.rendering.look import Frame
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import require
 
 if TYPE_CHECKING:
-    from usm_gym.rendering.canvas import Canvas
     from usm_gym.rendering.window import Window
 
 RENDER_MODES = ("human", "rgb_array")
@@ -29,8 +27,14 @@ class Viewer:
         mode: The render mode, "human" or "rgb_array".
     """
 
-    def __init__(self, render_mode: str, robots: int = 1, in_window: int = 0) -> None:
+    def __init__(self, robot: Any, render_mode: str, robots: int = 1, in_window: int = 0) -> None:
         """Follow all of `robots` robots for images, or the robot `in_window` for a window.
+
+        Args:
+            robot: The robot that all of them are.
+            render_mode: "human" or "rgb_array".
+            robots: How many there are.
+            in_window: The one that a window shows.
 
         Raises:
             ValueError: If the render mode is unknown.
@@ -38,8 +42,9 @@ class Viewer:
         require(render_mode in RENDER_MODES, "render_mode", render_mode, "None, human, rgb_array")
         self.mode = render_mode
         indices = [in_window] if render_mode == "human" else range(robots)
-        self._recorders = [Recorder(index) for index in indices]
-        self._canvas: Canvas | None = None
+        self._depiction = depiction_of(robot)
+        self._recorders = [self._depiction.recorder(index) for index in indices]
+        self._canvas: AnyCanvas | None = None
         self._window: Window | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -52,7 +57,7 @@ class Viewer:
         if self.mode == "human":
             self.render(simulation)
 
-    def render(self, simulation: Simulation) -> tuple[NDArray[np.uint8], ...] | None:
+    def render(self, simulation: Simulation) -> tuple[Frame, ...] | None:
         """Draw the present: one image per robot, (height, width, 3); None with a window.
 
         Raises:
@@ -62,13 +67,13 @@ class Viewer:
             self._canvas = self._open()
         if self._window is not None and self._window.closed:
             return None
-        pictures = [recorder.picture(simulation) for recorder in self._recorders]
-        images = tuple(
-            self._canvas.draw(picture, f"{picture.scenario.mode} mode") for picture in pictures
-        )
+        images = []
+        for recorder in self._recorders:
+            mode = simulation.scenarios[recorder.index].mode
+            images.append(self._canvas.draw(recorder.picture(simulation), f"{mode} mode"))
         if self._window is None:
-            return images
-        self._window.show(images[0], 1 / pictures[0].scenario.conditions.control_period)
+            return tuple(images)
+        self._window.show(images[0], 1 / simulation.scenarios[0].conditions.control_period)
         return None
 
     def close(self) -> None:
@@ -77,15 +82,14 @@ class Viewer:
             self._window.close()
         self._window = self._canvas = None
 
-    def _open(self) -> Canvas:
+    def _open(self) -> AnyCanvas:
         try:
-            from usm_gym.rendering.canvas import Canvas
+            canvas = self._depiction.canvas()
             from usm_gym.rendering.window import Window
         except ImportError as error:
             raise gym.error.DependencyNotInstalled(
                 f"render_mode={self.mode!r} needs {error.name}: pip install 'usm-gym[render]'"
             ) from error
-        canvas = Canvas()
         if self.mode == "human":
             self._window = Window(canvas.size, "usm-gym")
         return canvas

@@ -13,6 +13,7 @@ from support.episodes import NOISY
 import usm_gym
 
 IDS = ("USM-Operation-v0", "USM-Torpedo-v0")
+SPATIAL_IDS = ("USM-Operation3D-v0", "USM-Torpedo3D-v0")
 KEYS = {
     "error_x",
     "error_y",
@@ -38,7 +39,7 @@ def rollout(env, steps, seed=0, policy_id="sta"):
     return record
 
 
-@pytest.mark.parametrize("id", IDS)
+@pytest.mark.parametrize("id", [*IDS, *SPATIAL_IDS])
 @pytest.mark.parametrize("render_mode", [None, "human", "rgb_array"])
 def test_checkers_have_no_complaint(id, checkers, render_mode):
     env = gym.make(id, render_mode=render_mode).unwrapped

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import pygame
 import pytest
 
 import usm_gym
@@ -13,23 +14,28 @@ from usm_gym.rendering.comparison import (
     measured,
     scored_distances,
 )
+from usm_gym.rendering.depiction import depiction_of
 from usm_gym.rendering.look import HEAD, WATER
-from usm_gym.rendering.picture import Recorder, drift, velocity
+from usm_gym.rendering.picture import drift, velocity
+from usm_gym.rendering.space.camera import View, following
+from usm_gym.rendering.space.row import SpatialRow
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
+from usm_gym.task.spatial_sampling import nominal_in_space
 from usm_gym.task.water import Water
 
 SCENARIO = dataclasses.replace(usm_gym.suite("operation-basin")[4], duration=3.0, settle_time=1.0)
+IN_SPACE = dataclasses.replace(nominal_in_space("torpedo3d"), duration=3.0, settle_time=1.0)
 
 
 def picture(steps, thrust=0.0, scenario=SCENARIO):
     """A picture after some control periods of constant thrust, and the errors on the way."""
-    simulation, recorder = Simulation([scenario]), Recorder()
+    simulation, recorder = Simulation([scenario]), depiction_of(scenario.body).recorder()
     errors = []
     for _ in range(steps):
         recorder.note(simulation)
         errors.append(simulation.error[0].copy())
-        simulation.step(np.full((1, 5), thrust))
+        simulation.step(np.full((1, simulation.world.thrusters), thrust))
     errors.append(simulation.error[0].copy())
     return recorder.picture(simulation), np.array(errors)
 
@@ -39,9 +45,9 @@ def where(frame, colour, tolerance=6):
     return np.argwhere(np.abs(frame.astype(int) - colour).max(axis=2) <= tolerance)
 
 
-def compared(pictures, width=480):
+def compared(pictures, width=480, scenario=SCENARIO):
     captions = [Caption(str(k), "position only") for k in range(len(pictures))]
-    return Comparison(width, captions, pictures, 1.0).draw(pictures)
+    return Comparison(width, captions, scenario, pictures, 1.0).draw(pictures)
 
 
 def test_what_is_read_out_is_the_distance_after_settling():
@@ -91,10 +97,32 @@ def test_every_policy_has_its_own_robot_below_the_last(count):
     assert len(where(frame, WATER, 0)) > 10_000
 
 
+def test_robots_in_space_stand_one_above_the_other():
+    shown = [picture(60, thrust, IN_SPACE)[0] for thrust in (0.0, 1.0)]
+    frame = compared(shown, scenario=IN_SPACE)
+    red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
+    heads = np.argwhere(((red - blue > 70) & (green > 0.6 * red))[:340])  # above the chart
+    assert len(np.flatnonzero(np.diff(np.unique(heads[:, 0])) > 20)) == 1
+
+
+@pytest.mark.parametrize("error", [(0.02, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, -0.02)])
+def test_a_lens_shows_an_error_as_the_camera_sees_it(error):
+    shown, _ = picture(1, scenario=IN_SPACE)
+    shown = dataclasses.replace(shown, errors=np.array([error, error]))
+    row, frame = SpatialRow(pygame.Rect(0, 0, 452, 122), 1.0, 0.02), pygame.Surface((452, 122))
+    row.draw(frame, shown, COLOURS[0])
+    pixels = pygame.surfarray.array3d(frame)[344:].swapaxes(0, 1)
+    arrow = where(pixels, COLOURS[0], 20).mean(axis=0) - (51, 399 - 344)
+    camera = View(following(shown), (0, 0), 1.0, 0.1)
+    seen = camera.see(shown.reference + np.array([(0, 0, 0), error]))
+    across, down = np.diff(seen, axis=0)[0]
+    assert arrow @ (down, across) > 0.9 * np.linalg.norm(arrow) * np.hypot(across, down)
+
+
 @pytest.mark.parametrize("width", [380, 480, 719])
 def test_sizes_suit_an_encoder(width):
     shown, _ = picture(3)
-    comparison = Comparison(width, [Caption("a"), Caption("b")], [shown] * 2, 1.0)
+    comparison = Comparison(width, [Caption("a"), Caption("b")], SCENARIO, [shown] * 2, 1.0)
     assert comparison.draw([shown] * 2).shape == (comparison.size[1], width, 3)
     assert comparison.size[1] % 2 == 0
 

@@ -16,6 +16,7 @@ import usm_baselines
 import usm_gym
 from usm_gym.rendering.canvas import SCENE, Canvas
 from usm_gym.rendering.chart import error_scale
+from usm_gym.rendering.depiction import depiction_of
 from usm_gym.rendering.look import HEAD, JET_CORE, REFERENCE, TAIL, TRAIL
 from usm_gym.rendering.picture import Recorder
 from usm_gym.rendering.scene import OUTLINE
@@ -23,6 +24,7 @@ from usm_gym.rendering.window import Window, _windows
 
 ID = "usm_gym:USM-Operation-v0"
 RESIDUAL = "usm_agents:USM-OperationResidual-v0"
+SPATIAL = "usm_gym:USM-Operation3D-v0"
 
 
 def vector(count, id=ID, **arguments):
@@ -121,25 +123,30 @@ def test_the_scale_of_the_error_is_round_and_large_enough():
         assert error_scale(np.array([[0.0, -largest]])) == pytest.approx(scale)
 
 
-def test_rendering_does_not_touch_the_physics():
-    plain, rendered = gym.make(ID), gym.make(ID, render_mode="rgb_array")
+@pytest.mark.parametrize("id", [ID, SPATIAL])
+def test_rendering_does_not_touch_the_physics(id):
+    plain, rendered = gym.make(id), gym.make(id, render_mode="rgb_array")
     for env in (plain, rendered):
         env.reset(seed=3)
-    for action in np.random.default_rng(0).uniform(-1, 1, (20, 5)).astype(np.float32):
+    size = plain.action_space.shape
+    for action in np.random.default_rng(0).uniform(-1, 1, (5, *size)).astype(np.float32):
         before, *_ = plain.step(action)
         after, *_ = rendered.step(action)
         rendered.render()
         assert (before == after).all()
 
 
-def test_a_robot_that_is_lost_is_drawn():
-    for conditions in ({"integrator": "explicit"}, "field"):  # not finite; half a metre away
-        env = gym.make(ID, render_mode="rgb_array", conditions=conditions)
+@pytest.mark.parametrize("id", [ID, SPATIAL])
+def test_a_robot_that_is_lost_is_drawn(id):
+    # Not finite; half a metre away.
+    for conditions in ({"integrator": "explicit", "physics_step": 0.02}, "field"):
+        env = gym.make(id, render_mode="rgb_array", conditions=conditions)
         env.reset(seed=0)
         terminated = False
         while not terminated:
-            *_, terminated, _, _ = env.step(np.ones(5, np.float32))
-        picture = Recorder().picture(env.unwrapped.simulation)
+            *_, terminated, _, _ = env.step(np.ones(env.action_space.shape, np.float32))
+        simulation = env.unwrapped.simulation
+        picture = depiction_of(simulation.scenarios[0].body).recorder().picture(simulation)
         assert picture.lost
         assert all(np.isfinite(each).all() for each in (picture.body.centres, picture.errors))
         assert env.render().shape == (480, 640, 3)
@@ -155,7 +162,7 @@ def test_a_restored_episode_has_no_trail_that_it_was_not_seen_to_leave():
     assert other.render().shape == (480, 640, 3)
 
 
-@pytest.mark.parametrize("id", [ID, RESIDUAL])
+@pytest.mark.parametrize("id", [ID, RESIDUAL, SPATIAL])
 def test_a_vector_environment_gives_an_image_of_each_robot(id):
     envs = vector(3, id, render_mode="rgb_array")
     singles = [gym.make(id, render_mode="rgb_array") for _ in range(3)]
@@ -175,11 +182,12 @@ def test_a_vector_environment_gives_an_image_of_each_robot(id):
     envs.close()
 
 
-def test_a_window_shows_the_chosen_robot_of_a_vector(monkeypatch):
+@pytest.mark.parametrize("id", [ID, SPATIAL])
+def test_a_window_shows_the_chosen_robot_of_a_vector(id, monkeypatch):
     shown = []
     monkeypatch.setattr(Window, "show", lambda window, frame, fps: shown.append(frame))
-    envs = vector(3, render_mode="human", render_index=2)
-    single = gym.make(ID, render_mode="rgb_array")
+    envs = vector(3, id, render_mode="human", render_index=2)
+    single = gym.make(id, render_mode="rgb_array")
     envs.reset(seed=5)
     single.reset(seed=7)
     assert envs.render() is None
@@ -187,7 +195,7 @@ def test_a_window_shows_the_chosen_robot_of_a_vector(monkeypatch):
     assert (shown[-1] == single.render()).all()
     envs.close()
     with pytest.raises(ValueError, match="render_index is 3; allowed: 0 to 2"):
-        usm_gym.envs.usm.USMVectorEnv(3, "operation", render_index=3)
+        vector(3, id, render_index=3)
 
 
 def test_an_episode_after_another_starts_a_trail_of_its_own():
@@ -200,9 +208,10 @@ def test_an_episode_after_another_starts_a_trail_of_its_own():
     assert picture.instants.tolist() == [0, 1, 2]
 
 
-def test_the_frame_rate_is_the_control_rate():
-    assert gym.make(ID).metadata["render_fps"] == 50
-    slow = gym.make(ID, conditions={"control_period": 0.04})
+@pytest.mark.parametrize("id", [ID, SPATIAL])
+def test_the_frame_rate_is_the_control_rate(id):
+    assert gym.make(id).metadata["render_fps"] == 50
+    slow = gym.make(id, conditions={"control_period": 0.04})
     assert slow.unwrapped.metadata["render_fps"] == 25
 
 
@@ -220,14 +229,15 @@ def test_a_window_that_is_closed_by_hand_ends_nothing():
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="no /proc")
 @pytest.mark.parametrize("render_mode", ["human", "rgb_array"])
-def test_environments_leave_nothing_behind(render_mode):
+@pytest.mark.parametrize("id", [ID, SPATIAL])
+def test_environments_leave_nothing_behind(id, render_mode):
     def left():
         gc.collect()
         files, threads = os.listdir("/proc/self/fd"), os.listdir("/proc/self/task")
         return len(files), len(threads), set(_windows)
 
     def use():
-        env = gym.make(ID, render_mode=render_mode)
+        env = gym.make(id, render_mode=render_mode)
         env.reset(options={"scenario": "nominal"})
         env.render()
         env.close()
@@ -235,7 +245,7 @@ def test_environments_leave_nothing_behind(render_mode):
 
     use()  # loads libraries once
     before = left()
-    for _ in range(10):
+    for _ in range(5):
         use()
     assert left() == before
 
@@ -288,10 +298,11 @@ def test_a_window_outlives_anybodys_quit():
     [
         lambda **mode: gym.make(ID, **mode),
         lambda **mode: gym.make(RESIDUAL, **mode),
+        lambda **mode: gym.make(SPATIAL, **mode),
         lambda **mode: vector(3, **mode),
         lambda **mode: vector(3, RESIDUAL, **mode),
     ],
-    ids=["single", "residual", "vector", "residual vector"],
+    ids=["single", "residual", "spatial", "vector", "residual vector"],
 )
 def test_a_copy_goes_on_as_the_original(make, copied, render_mode):
     env = make(render_mode=render_mode)
@@ -306,7 +317,7 @@ def test_a_copy_goes_on_as_the_original(make, copied, render_mode):
             np.testing.assert_equal(ours, theirs)
     np.testing.assert_equal(env.render(), other.render())
     first, second = (each.unwrapped.simulation for each in (env, other))
-    np.testing.assert_equal(first.read("theta"), second.read("theta"))
+    np.testing.assert_equal(first.read("position"), second.read("position"))
     np.testing.assert_equal(first.snapshot().arrays, second.snapshot().arrays)
     env.close()
     other.close()

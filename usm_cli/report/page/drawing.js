@@ -120,3 +120,37 @@ function jet(context, [x, y], [flowX, flowY], breadth, metre) {
     shape(context, [at(0, -0.5), at(0.9, -1), at(1, 0), at(0.9, 1), at(0, 0.5)], style(JETS[k]));
   });
 }
+
+/** How fast the water moves, and whereto as the view sees it: `seen` gives right and up. */
+function drawCurrent(context, { current, data, time }, seen) {
+  if (!current) return;
+  const velocity = rowAt(current, time / data.frame, true);
+  const speed = Math.hypot(...velocity);
+  context.fillStyle = style("--quiet");
+  context.font = "12px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.fillText(speed ? `current ${three(100 * speed)} cm/s` : "still water", speed ? 42 : 14, 22);
+  if (!speed) return;
+  const [right, up] = seen(velocity).map((part) => part / speed);
+  arrow(context, [24 - 10 * right, 18 + 10 * up], [24 + 10 * right, 18 - 10 * up], style("--current"), 2);
+}
+
+/** Say that the robot is lost. */
+function drawLoss(context, replay) {
+  if (!replay.lostAt(replay.a, replay.time)) return;
+  context.fillStyle = style("--alarm");
+  context.font = "bold 14px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.fillText(`${replay.a.name}: robot lost`, 14, 44);
+}
+
+/** A straight arrow, without a shaft if it is short. */
+function arrow(context, [x, y], tip, colour, width) {
+  const length = Math.hypot(tip[0] - x, tip[1] - y);
+  const head = 4.5 * width;
+  if (length < 0.4 * head) return;
+  const [aheadX, aheadY] = [(tip[0] - x) / length, (tip[1] - y) / length];
+  const at = (back, across) => [tip[0] - back * aheadX - across * aheadY, tip[1] - back * aheadY + across * aheadX];
+  if (length > head) line(context, [[x, y], at(0.9 * head, 0)], colour, width);
+  shape(context, [tip, at(head, 0.5 * head), at(head, -0.5 * head)], colour);
+}

@@ -13,7 +13,7 @@ from usm_gym.rendering.look import (
     JET,
     TAIL,
 )
-from usm_gym.rendering.space.mesh import Mesh, joined, revolved
+from usm_gym.rendering.space.mesh import Mesh, Solid, joined, revolved
 from usm_gym.spatial_robot import SpatialRobot, SpatialThruster
 
 Array = NDArray[np.float64]
@@ -33,6 +33,11 @@ JET_LENGTH, JET_RADIUS = 0.13, 0.95
 
 def body(robot: SpatialRobot) -> Mesh:
     """Links, joints and thrusters in the axes of their links."""
+    return joined([solid.mesh() for solid in solids(robot)])
+
+
+def solids(robot: SpatialRobot) -> list[Solid]:
+    """Links, joints and thrusters, each of several solids."""
     parts = []
     for i, (length, radius) in enumerate(zip(robot.lengths, robot.radii, strict=True)):
         parts.append(_link(i, length, radius, len(robot.links)))
@@ -40,11 +45,12 @@ def body(robot: SpatialRobot) -> Mesh:
             at, joint = np.array([length / 2, 0.0, 0.0]), JOINT * radius
             turns = np.linspace(0.0, np.pi, 7)
             ball = joint * np.stack([-np.cos(turns), np.sin(turns)], axis=1)
-            parts.append(revolved(ball, BODY_EDGE, BODY_EDGE, i, at).behind(radius))
+            # The links hide what is within them.
+            parts.append(Solid(ball, 6 * [BODY_EDGE], BODY_EDGE, i, at, deeper=radius))
             parts += _collars(PIN, radius, i, at, np.array(robot.joint_axes[i]))
     for thruster in robot.thrusters:
         parts += _thruster(robot, thruster)
-    return joined(parts)
+    return parts
 
 
 def hull(robot: SpatialRobot) -> Mesh:
@@ -75,18 +81,29 @@ def jets(robot: SpatialRobot, thrust: Array) -> list[tuple[Mesh, float]]:
         length = JET_LENGTH * total * abs(share)
         if length < 0.004 * total:
             continue
-        radius = robot.radii[thruster.link - 1]
-        mouth = COLLAR if _is_tunnel(thruster, radius) else HALF_DUCT
-        flow = -np.sign(share) * np.array(thruster.direction)
-        wide = JET_RADIUS * DUCT * radius
+        at, direction, mouth, wide = jet_place(robot, thruster)
+        flow = -np.sign(share) * direction
         profile = [(0.0, 0.0), (0.0, 0.55 * wide), (0.85 * length, wide), (length, 0.0)]
-        at = _position(robot, thruster) + mouth * radius * flow
+        at = at + mouth * flow
         jet = revolved(profile, JET, JET, thruster.link - 1, at, flow)
         found.append((jet, float(share)))
     return found
 
 
-def _link(i: int, length: float, radius: float, links: int) -> Mesh:
+def jet_place(robot: SpatialRobot, thruster: SpatialThruster) -> tuple[Array, Array, float, float]:
+    """Where jets of a thruster start.
+
+    Returns:
+        The middle of the thruster, m, and the direction of a positive force, in link axes, how far
+        from there along it or against it they start, m, and how wide they become, m.
+    """
+    radius = robot.radii[thruster.link - 1]
+    mouth = (COLLAR if _is_tunnel(thruster, radius) else HALF_DUCT) * radius
+    direction = np.array(thruster.direction)
+    return _position(robot, thruster), direction, float(mouth), float(JET_RADIUS * DUCT * radius)
+
+
+def _link(i: int, length: float, radius: float, links: int) -> Solid:
     is_tail, is_head = i == 0, i == links - 1
     half = length / 2 - min(GAP * radius, 0.2 * length)
     back = min(ROUNDING * radius, 0.4 * half)
@@ -107,16 +124,14 @@ def _link(i: int, length: float, radius: float, links: int) -> Mesh:
     if is_head:
         colour, edge = HEAD, HEAD_EDGE
     profile = np.concatenate([ends[0], side, ends[1]])
-    mesh = revolved(profile, colour, edge, i)
-    # A stripe along the top shows how a link rolls; the head looks ahead.
-    mesh.colours[len(ends[0]) - 1 : len(profile) - len(ends[1]), 0] = edge
-    if is_head:
-        mesh.colours[-2:] = HEAD_EDGE
-    else:
-        mesh.colours[-1] = BODY_EDGE
+    colours = [colour] * (len(profile) - 1)
+    # The head looks ahead.
+    colours[-2 if is_head else -1 :] = 2 * [HEAD_EDGE] if is_head else [BODY_EDGE]
     if not is_tail:
-        mesh.colours[0] = BODY_EDGE
-    return mesh
+        colours[0] = BODY_EDGE
+    # A stripe along the top shows how a link rolls.
+    stripe = (len(ends[0]) - 1, len(profile) - len(ends[1]))
+    return Solid(profile, colours, edge, i, stripe=stripe)
 
 
 def _end(rounded: Array, depth: float, radius: float, closed: bool) -> Array:
@@ -127,7 +142,7 @@ def _end(rounded: Array, depth: float, radius: float, closed: bool) -> Array:
     return np.concatenate([[(0.0, 0.0)], blunt[1:]])
 
 
-def _thruster(robot: SpatialRobot, thruster: SpatialThruster) -> list[Mesh]:
+def _thruster(robot: SpatialRobot, thruster: SpatialThruster) -> list[Solid]:
     i = thruster.link - 1
     radius, direction = robot.radii[i], np.array(thruster.direction)
     at = _position(robot, thruster)
@@ -139,22 +154,21 @@ def _thruster(robot: SpatialRobot, thruster: SpatialThruster) -> list[Mesh]:
     root, reach = 0.8 * radius, float(np.linalg.norm(arm)) - 0.7 * DUCT * radius
     if reach < root:
         return [duct]
-    strut = [(root, 0.0), (root, STRUT * radius), (reach, STRUT * radius), (reach, 0.0)]
-    return [revolved(strut, TAIL, BODY_EDGE, i, at - arm, arm), duct]
+    strut = np.array([(root, 0.0), (root, STRUT * radius), (reach, STRUT * radius), (reach, 0.0)])
+    return [Solid(strut, 3 * [TAIL], BODY_EDGE, i, at - arm, arm), duct]
 
 
-def _collars(width: float, radius: float, link: int, at: Array, axis: Array) -> list[Mesh]:
+def _collars(width: float, radius: float, link: int, at: Array, axis: Array) -> list[Solid]:
     """The two ends of a tube or a pin across a link, which look out of it."""
     collar = _drum((COLLAR - 0.9) / 2 * radius, width * radius)
     middle = (COLLAR + 0.9) / 2 * radius
     return [_duct(collar, link, at + side * middle * axis, axis) for side in (-1, 1)]
 
 
-def _duct(profile: Array, link: int, at: Array, direction: Array) -> Mesh:
+def _duct(profile: Array, link: int, at: Array, direction: Array) -> Solid:
     """A drum with dark openings."""
-    mesh = revolved(profile, TAIL, BODY_EDGE, link, at, direction)
-    mesh.colours[[0, -1]] = BODY_EDGE
-    return mesh
+    colours = [BODY_EDGE, *(len(profile) - 3) * [TAIL], BODY_EDGE]
+    return Solid(profile, colours, BODY_EDGE, link, at, direction)
 
 
 def _drum(half: float, radius: float) -> Array:

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 # Over the robot's length: how far off the camera is, how far below the reference it aims, and what
 # is too near to be seen.
-DISTANCE, LOWERED, NEAR = 1.25, 0.035, 0.03
+DISTANCE, LOWERED, NEAR = 1.38, 0.035, 0.03
 # The camera stands behind the robot, to its right and above it: its direction from the robot.
 AZIMUTH, ELEVATION = np.radians(-116.0), np.radians(17.0)
 WIDE = float(np.radians(46.0))

@@ -8,16 +8,19 @@ import numpy as np
 import pygame
 
 from usm_gym.rendering import legend
-from usm_gym.rendering.canvas import ARROW, ARROW_AREA, HEIGHT, WIDTH, Frame
+from usm_gym.rendering.canvas import ARROW, ARROW_AREA
 from usm_gym.rendering.chart import Chart, error_scale, measured
 from usm_gym.rendering.look import (
     ALARM,
     AXIS_COLOURS,
     CURRENT,
     GREY,
+    HEIGHT,
     INK,
     PAPER,
+    WIDTH,
     Colour,
+    Frame,
 )
 from usm_gym.rendering.panel import LEFT, RIGHT, Panel, write
 from usm_gym.rendering.scene import arrow
@@ -25,7 +28,7 @@ from usm_gym.rendering.space.camera import Camera, View, following
 from usm_gym.rendering.space.picture import SpatialPicture
 from usm_gym.rendering.space.scene import SpatialScene
 
-# Everything is laid out on 640 x 480 points.
+# Places, points.
 SCENE = pygame.Rect(14, 52, 612, 280)
 LEGEND = 346
 CAPTIONS = 362
@@ -51,16 +54,16 @@ class SpatialCanvas:
         self,
         picture: SpatialPicture,
         title: str,
-        camera: Camera | None = None,
         scale: float | None = None,
+        camera: Camera | None = None,
     ) -> Frame:
         """Draw a picture.
 
         Args:
             picture: The picture.
             title: The words above it.
-            camera: Where it is seen from; None moves along with the reference.
             scale: The largest error in the chart, m; None fits the errors so far.
+            camera: Where it is seen from; None moves along with the reference.
 
         Returns:
             Red, green and blue, (height, width, 3).
@@ -112,7 +115,7 @@ class SpatialCanvas:
         for k, name in enumerate(("roll", "pitch", "yaw")):
             y = CHART.top + 2 + LINE * k
             self._text(name, (14, y), 13, GREY)
-            degrees = f"{np.degrees(picture.attitude[k]) + 0.0:.1f}°".replace("-", "−")
+            degrees = f"{np.degrees(picture.attitude[k]).round(1) + 0.0:.1f}°".replace("-", "−")
             self._text(degrees, (NUMBERS, y), 13, INK, RIGHT)
 
     def _legend(self, picture: SpatialPicture) -> None:
@@ -123,9 +126,10 @@ class SpatialCanvas:
             ("its goal", 18, legend.goal),
             ("path", 20, legend.path),
             ("track", 18, legend.track),
-            (f"thrust, at most {picture.limit:g} N", 30, legend.thrust),
+            ("reference", 20, legend.wanted),
+            (f"thrust, up to {picture.limit:g} N", 20, legend.thrust),
         ]
-        signs += [("joints start to move", 6, legend.shift)] if picture.shifts else []
+        signs += [("joints bend", 6, legend.shift)] if picture.shifts else []
         legend.legend(self._frame, self._unit, (14.0, LEGEND), signs)
 
     def _text(

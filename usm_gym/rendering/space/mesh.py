@@ -56,15 +56,45 @@ class Mesh:
         normals = np.einsum("sab,sfb->sfa", turns, self.normals)
         return replace(self, corners=corners, normals=normals)
 
-    def behind(self, depth: float) -> Mesh:
-        """The mesh of something within others, which shall hide it: its `deeper` is a depth, m."""
-        return replace(self, deeper=np.full(len(self.deeper), depth))
-
     def lit(self) -> Array:
         """Colours of the facets in the light, (slices, SIDES, 3)."""
         facing = (1 + self.normals @ LIGHT / np.linalg.norm(LIGHT)) / 2
         shade = DARKEST + (BRIGHTEST - DARKEST) * facing[..., np.newaxis]
         return np.asarray(np.clip(self.colours * shade, 0, 255))
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A solid of revolution that a link carries.
+
+    Attributes:
+        profile: Places along the axis, in ascending order, and radii there, m, (slices + 1, 2).
+        colours: Colours of the slices, (slices,).
+        edge: Colour of the outline.
+        link: The link that carries it, counted from 0.
+        at: Where place 0 is, in link axes, m.
+        axis: Direction of its axis in link axes.
+        stripe: The first slice with a stripe of the edge's colour along the top, and the one after
+            the last.
+        deeper: See `Mesh`, m.
+    """
+
+    profile: Array
+    colours: Sequence[Colour]
+    edge: Colour
+    link: int
+    at: ArrayLike = (0.0, 0.0, 0.0)
+    axis: ArrayLike = (1.0, 0.0, 0.0)
+    stripe: tuple[int, int] = (0, 0)
+    deeper: float = 0.0
+
+    def mesh(self) -> Mesh:
+        """Its facets."""
+        first = self.colours[0]
+        mesh = revolved(self.profile, first, self.edge, self.link, self.at, self.axis)
+        mesh.colours[:] = np.array(self.colours)[:, np.newaxis]
+        mesh.colours[slice(*self.stripe), 0] = self.edge
+        return replace(mesh, deeper=np.full(len(mesh.deeper), self.deeper))
 
 
 def revolved(

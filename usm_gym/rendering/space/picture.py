@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,18 @@ from usm_gym.spatial_robot import SpatialRobot
 Array = NDArray[np.float64]
 
 
+class Pose(NamedTuple):
+    """Where the links are, and how they are turned.
+
+    Attributes:
+        rotations: Their rotations, tail first, from link axes, (links, 3, 3).
+        centres: Their centres, m, (links, 3).
+    """
+
+    rotations: Array
+    centres: Array
+
+
 @dataclass(frozen=True)
 class SpatialPicture:
     """One robot at one control instant, in the global frame; all numbers are finite.
@@ -20,8 +33,9 @@ class SpatialPicture:
     Attributes:
         robot: The robot.
         time: Time since the start, s.
-        rotations: Rotations of the links, tail first, from link axes, (links, 3, 3).
-        centres: Their centres, m, (links, 3).
+        body: The robot's true pose.
+        wanted: The pose with the reference joint angles at the reference of the attitude, its
+            centre of mass at the reference of the position.
         thrust: Forces of the thrusters over their limit, (thrusters,).
         limit: The limit, N.
         current: Velocity of the water, m/s, (3,).
@@ -40,8 +54,8 @@ class SpatialPicture:
 
     robot: SpatialRobot
     time: float
-    rotations: Array
-    centres: Array
+    body: Pose
+    wanted: Pose
     thrust: Array
     limit: float
     current: Array
@@ -60,4 +74,4 @@ class SpatialPicture:
     @property
     def attitude(self) -> Array:
         """Roll, pitch and yaw of the root, rad, (3,); a positive pitch lowers the head."""
-        return roll_pitch_yaw(self.rotations[len(self.robot.links) // 2])
+        return roll_pitch_yaw(self.body.rotations[len(self.robot.links) // 2])

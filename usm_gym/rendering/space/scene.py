@@ -14,6 +14,7 @@ from usm_gym.rendering.look import (
     INK,
     REFERENCE,
     TRAIL,
+    WANTED,
     Colour,
     Points,
     faded,
@@ -62,14 +63,33 @@ Word = tuple[str, tuple[float, float], Colour]
 class SpatialScene:
     """A view of a robot in the water, over a floor with its shadow."""
 
-    def __init__(self, area: pygame.Rect, unit: float) -> None:
-        """Prepare a view on an area, in points of `unit` pixels."""
-        self._panel = Panel(area, unit)
+    def __init__(self, area: pygame.Rect, unit: float, measured: bool = True) -> None:
+        """Prepare a view on an area, in points of `unit` pixels.
+
+        Args:
+            area: Where the view is.
+            unit: Pixels in a point.
+            measured: Whether it has a bar that shows a length, and the directions of the axes.
+        """
+        self._panel, self._measured = Panel(area, unit), measured
         self._area, self._unit = area, unit
         self._robot: SpatialRobot | None = None
 
-    def draw(self, frame: pygame.Surface, picture: SpatialPicture, camera: Camera) -> View:
-        """Draw a picture, as a camera sees it, on a frame; return the view."""
+    def draw(
+        self,
+        frame: pygame.Surface,
+        picture: SpatialPicture,
+        camera: Camera,
+        track: Colour = TRAIL,
+    ) -> View:
+        """Draw a picture, as a camera sees it, on a frame; return the view.
+
+        Args:
+            frame: The frame.
+            picture: The picture.
+            camera: The camera.
+            track: Colour of the track of the centre of mass.
+        """
         if picture.robot is not self._robot:
             self._robot = picture.robot
             self._body, self._hull = body(picture.robot), hull(picture.robot)
@@ -80,12 +100,15 @@ class SpatialScene:
         self._floor = float(picture.path[:, 2].min()) - FLOOR * self._length
         self._water()
         self._lines(picture)
-        self._shadow(self._hull.posed(picture.rotations, picture.centres))
+        self._shadow(self._hull.posed(*picture.body))
         self._path(picture)
-        mesh = self._body.posed(picture.rotations, picture.centres)
+        self._ghost(self._hull.posed(*picture.wanted))
+        mesh = self._body.posed(*picture.body)
         paint(self._panel, self._view, mesh, self._jets(picture) + self._stream(picture))
-        self._marks(picture)
-        words = [*self._axes(), *self._bar(view.metre(picture.reference))]
+        self._marks(picture, track)
+        words = []
+        if self._measured:
+            words = [*self._axes(), *self._bar(view.metre(picture.reference))]
         self._panel.show(frame)
         for word, at, colour in words:
             write(frame, self._unit, word, at, 10, colour, MIDDLE)
@@ -125,10 +148,16 @@ class SpatialScene:
         if seen.any():
             self._panel.veil(self._view.see(dropped[seen]), SHADOW, SHADE)
 
+    def _ghost(self, mesh: Mesh) -> None:
+        """Draw the pose that is asked for, of which the body leaves free where it is not."""
+        seen = (self._view.depth(mesh.corners) > self._view.near).all(axis=2)
+        if seen.any():
+            self._panel.veil(self._view.see(mesh.corners[seen]), REFERENCE, WANTED)
+
     def _jets(self, picture: SpatialPicture) -> list[Task]:
         tasks = []
         for jet, share in jets(picture.robot, picture.thrust):
-            posed = jet.posed(picture.rotations, picture.centres)
+            posed = jet.posed(*picture.body)
             task = jet_painter(self._panel, self._view, posed, share)
             tasks += [task] if task else []
         return tasks
@@ -179,7 +208,7 @@ class SpatialScene:
         if self._view.depth(foot) > self._view.near:
             self._panel.disc(self._view.see(foot), 2.5, PATH_SHADOW)
 
-    def _marks(self, picture: SpatialPicture) -> None:
+    def _marks(self, picture: SpatialPicture, track: Colour) -> None:
         """Draw path, track, centre of mass and its goal, over everything."""
         panel, view = self._panel, self._view
         dots = self._dots(picture.path)
@@ -188,7 +217,7 @@ class SpatialScene:
         if len(dots):
             panel.disc(view.see(dots), 1.3, INK)
         for part in view.see_line(thinned(picture.track, 500)):
-            panel.line(part, 2.2, TRAIL)
+            panel.line(part, 2.2, track)
         arm = ARM * self._length
         for axis in np.eye(3):
             for part in view.see_line(picture.reference + arm * np.outer((-1, 1), axis)):

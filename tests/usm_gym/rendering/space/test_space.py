@@ -12,7 +12,7 @@ from usm_gym.rendering.space.camera import Camera, View, following, orbiting
 from usm_gym.rendering.space.canvas import SCENE, SpatialCanvas
 from usm_gym.rendering.space.mesh import joined, revolved
 from usm_gym.rendering.space.paint import paint
-from usm_gym.rendering.space.picture import SpatialPicture
+from usm_gym.rendering.space.picture import Pose, SpatialPicture
 from usm_gym.spatial_posture import centre_of_mass, link_poses
 from usm_gym.spatial_robot import EELY
 
@@ -33,8 +33,8 @@ def picture(angles=(0.0,) * 8, **changes):
     made = SpatialPicture(
         robot=EELY,
         time=4.0,
-        rotations=rotations,
-        centres=centres,
+        body=Pose(rotations, centres),
+        wanted=Pose(rotations, centres),
         thrust=IDLE,
         limit=40.0,
         current=np.zeros(3),
@@ -51,7 +51,7 @@ def picture(angles=(0.0,) * 8, **changes):
 
 
 def scene(shown, azimuth, elevation):
-    frame = CANVAS.draw(shown, "a robot", orbiting((0, 0, 0), 4.5, azimuth, elevation))
+    frame = CANVAS.draw(shown, "a robot", camera=orbiting((0, 0, 0), 4.5, azimuth, elevation))
     rows, columns = (slice(start // 2, stop // 2) for start, stop in SIDES)
     return frame[rows, columns].astype(int)
 
@@ -121,7 +121,11 @@ def test_a_joint_that_turns_moves_the_head_to_its_side():
 )
 def test_jets_blow_against_the_force_and_are_longer_for_a_larger_one(number, view, flow):
     thruster = EELY.thrusters[number - 1]
-    tail_end = picture().centres[thruster.link - 1] - (EELY.lengths[thruster.link - 1] / 2, 0, 0)
+    tail_end = picture().body.centres[thruster.link - 1] - (
+        EELY.lengths[thruster.link - 1] / 2,
+        0,
+        0,
+    )
     at = place(tail_end + thruster.position, *view)
     full, half, back = ((jet(number, share, view) - at) @ flow for share in (1.0, 0.5, -1.0))
     assert full.mean() > 10
@@ -191,7 +195,7 @@ def test_the_same_picture_has_the_same_bytes_at_any_size():
         canvas, other = SpatialCanvas(width), SpatialCanvas(width)
         first = canvas.draw(shown, "a robot")
         assert first.shape == (width * 3 // 4, width, 3)
-        other.draw(picture(np.full(8, 0.3), time=3.0), "another", orbiting((1, 1, 1), 2.0))
+        other.draw(picture(np.full(8, 0.3), time=3.0), "another", camera=orbiting((1, 1, 1), 2.0))
         np.testing.assert_array_equal(other.draw(shown, "a robot"), first)
 
 
@@ -219,11 +223,12 @@ def test_the_camera_keeps_its_place_beside_the_reference():
 )
 def test_odd_cameras_and_lost_robots_are_drawn_without_a_fault(camera):
     shown = picture(thrust=np.linspace(-1, 1, 7), current=np.array([0.1, 0.05, 0.02]))
-    lost = replace(shown, centres=shown.centres + np.array((9, -9, 9)), lost=True)
+    away = shown.body._replace(centres=shown.body.centres + np.array((9, -9, 9)))
+    lost = replace(shown, body=away, lost=True)
     canvas = SpatialCanvas(160)
     with np.errstate(all="raise", under="ignore"):
         for each in (shown, lost):
-            canvas.draw(each, "a robot", camera)
+            canvas.draw(each, "a robot", camera=camera)
     view = View(camera, (0, 0), 600.0, 0.1)
-    assert np.isfinite(view.see(np.concatenate([shown.centres, lost.centres]))).all()
+    assert np.isfinite(view.see(np.concatenate([shown.body.centres, away.centres]))).all()
     assert np.isfinite(view.slopes(np.linspace(-300, 300, 7))).all()

@@ -1,0 +1,171 @@
+"""What a page must know of a robot to draw it: its shape, and its postures as rows of numbers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import singledispatch
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from usm_gym.rendering.look import BODY, BODY_EDGE, HEAD, HEAD_EDGE, TAIL, Colour
+from usm_gym.rendering.picture import Picture
+from usm_gym.rendering.space.body import JET_LENGTH, jet_place, solids
+from usm_gym.rendering.space.mesh import Solid
+from usm_gym.rendering.space.picture import Pose, SpatialPicture
+from usm_gym.robot import Robot
+from usm_gym.spatial_robot import SpatialRobot
+
+Array = NDArray[np.float64]
+
+# The names that the page has for colours.
+NAMES: dict[Colour, str] = {
+    BODY: "--body",
+    BODY_EDGE: "--joint",
+    HEAD: "--head",
+    HEAD_EDGE: "--nose",
+    TAIL: "--tail",
+}
+
+
+class Stage(ABC):
+    """How a page draws the robots of a world.
+
+    Attributes:
+        view: The name that the page has for the way in which it draws them.
+    """
+
+    view: ClassVar[str]
+
+    @abstractmethod
+    def robot(self) -> dict[str, Any]:
+        """The robot's shape, as the page's scripts take it."""
+
+    @abstractmethod
+    def postures(self, pictures: Sequence[Any]) -> Array:
+        """True postures, (pictures, numbers)."""
+
+    @abstractmethod
+    def references(self, pictures: Sequence[Any]) -> Array:
+        """Reference postures, (pictures, numbers)."""
+
+
+@singledispatch
+def stage_of(robot: Any) -> Stage:
+    """How a page draws a robot."""
+    raise TypeError(f"no page draws {type(robot).__name__}")
+
+
+class PlanarStage(Stage):
+    """Draws a chain of equal links from above; a posture is the angles of its links, rad."""
+
+    view = "plane"
+
+    def __init__(self, robot: Robot) -> None:
+        """Draw a robot."""
+        self._robot = robot
+
+    def robot(self) -> dict[str, Any]:
+        """Length and half width of a link, m, and the thrusters."""
+        robot = self._robot
+        return {
+            "length": robot.link_length,
+            "halfWidth": robot.half_width,
+            "thrusters": [
+                {"link": thruster.link - 1, "normal": thruster.direction == "normal"}
+                for thruster in robot.thrusters
+            ],
+        }
+
+    def postures(self, pictures: Sequence[Picture]) -> Array:
+        """Link angles, rad, (pictures, links)."""
+        return np.array([picture.body.angles for picture in pictures])
+
+    def references(self, pictures: Sequence[Picture]) -> Array:
+        """Link angles asked for, rad, (pictures, links)."""
+        return np.array([picture.reference.angles for picture in pictures])
+
+
+class SpatialStage(Stage):
+    """Draws solids in space; a posture is the root's quaternion and the joint angles, rad."""
+
+    view = "space"
+
+    def __init__(self, robot: SpatialRobot) -> None:
+        """Draw a robot."""
+        self._robot = robot
+
+    def robot(self) -> dict[str, Any]:
+        """Links, joints, solids and jets; lengths in m, masses in kg."""
+        robot = self._robot
+        places = [(each.link - 1, *jet_place(robot, each)) for each in robot.thrusters]
+        return {
+            "lengths": _rounded(robot.lengths),
+            "masses": _rounded(robot.masses),
+            "keels": _rounded(robot.keels),
+            "jointAxes": [list(axis) for axis in robot.joint_axes],
+            "solids": [_solid(solid) for solid in solids(robot)],
+            "jets": [
+                {
+                    "link": link,
+                    "at": _rounded(at),
+                    "direction": _rounded(direction),
+                    "mouth": round(mouth, 4),
+                    "width": round(width, 4),
+                }
+                for link, at, direction, mouth, width in places
+            ],
+            "jetLength": JET_LENGTH * float(robot.lengths.sum()),
+        }
+
+    def postures(self, pictures: Sequence[SpatialPicture]) -> Array:
+        """Quaternions (w, x, y, z) and joint angles, (pictures, 4 + joints)."""
+        return self._numbers([picture.body for picture in pictures])
+
+    def references(self, pictures: Sequence[SpatialPicture]) -> Array:
+        """The same of the reference, (pictures, 4 + joints)."""
+        return self._numbers([picture.wanted for picture in pictures])
+
+    def _numbers(self, poses: Sequence[Pose]) -> Array:
+        rotations = np.array([pose.rotations for pose in poses])
+        root = rotations.shape[1] // 2
+        quaternions = Rotation.from_matrix(rotations[:, root]).as_quat()[:, [3, 0, 1, 2]]
+        # Of the two quaternions of an attitude, the one nearer to the last, so that they mix.
+        same = (quaternions[1:] * quaternions[:-1]).sum(axis=1) >= 0.0
+        quaternions[1:] *= np.cumprod(np.where(same, 1.0, -1.0))[:, np.newaxis]
+        turns = np.swapaxes(rotations[:, :-1], 2, 3) @ rotations[:, 1:]
+        vectors = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_rotvec()
+        vectors = vectors.reshape(*turns.shape[:2], 3)
+        angles = (vectors * np.array(self._robot.joint_axes)).sum(axis=2)
+        return np.concatenate([quaternions, angles], axis=1)
+
+
+@stage_of.register
+def _(robot: Robot) -> Stage:
+    return PlanarStage(robot)
+
+
+@stage_of.register
+def _(robot: SpatialRobot) -> Stage:
+    return SpatialStage(robot)
+
+
+def _solid(solid: Solid) -> dict[str, Any]:
+    return {
+        "link": solid.link,
+        "profile": _rounded(solid.profile),
+        "colours": [NAMES[colour] for colour in solid.colours],
+        "edge": NAMES[solid.edge],
+        "at": _rounded(solid.at),
+        "axis": _rounded(solid.axis),
+        "stripe": list(solid.stripe),
+        "inside": bool(solid.deeper > 0.0),
+    }
+
+
+def _rounded(values: Any) -> list[Any]:
+    listed: list[Any] = np.asarray(values, np.float64).round(4).tolist()
+    return listed
