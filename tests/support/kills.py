@@ -85,8 +85,8 @@ def shrink():
     plans.PLANS["residual-ppo"] = replace(plans.PLANS["residual-ppo"], interval=8)
     dissection.SEGMENT, dissection.LONGEST_SHIFT = 16, 2
     registry._entries["sta"] = replace(registry._entries["sta"], space=SPACE)
-    tuned = tuning.sample
-    tuning.sample = lambda *of: brief(tuned(*of))
+    tuned = tuning.sample_of
+    tuning.sample_of = lambda *of: brief(tuned(*of))
     frozen = [brief(each) for each in suite(MAIN)[:4]]
     leaderboard.suites = lambda: {MAIN: frozen[:2], "other": frozen[2:]}
     # Of pictures only the names are compared, and of provenance nothing.
