@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from usm_gym.evaluation import metric_names
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.robot import Robot
+from usm_gym.simulation import Simulation
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.task.conditions import FIELD, Conditions
 from usm_gym.task.sampling import sample
@@ -54,3 +59,19 @@ def short(count: int, duration: float = 1.0, seed: int = 0) -> list[Scenario]:
         )
         for each in scenarios
     ]
+
+
+def seen_by(simulation: Simulation, robot: int = 0) -> dict[str, NDArray[Any]]:
+    """Return what a robot observes, in SI units, by the names of the entries."""
+    values = simulation.observation[robot] * simulation.layout.scale
+    return {name: values[part] for name, part in simulation.layout.slices.items()}
+
+
+def assert_fills(values: Any, low: float, high: float) -> None:
+    """Assert that values lie between two bounds, evenly and up to both."""
+    values = np.asarray(values, float)
+    width = high - low
+    assert low <= values.min() <= low + 0.02 * width
+    assert high - 0.02 * width <= values.max() <= high
+    quarters = np.histogram(values, 4, (low, high))[0] / values.size
+    np.testing.assert_allclose(quarters, 0.25, atol=0.05)

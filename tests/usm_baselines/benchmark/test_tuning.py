@@ -30,7 +30,9 @@ from usm_gym import suites
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION
 from usm_gym.task.conditions import FIELD
+from usm_gym.task.modes import in_space
 from usm_gym.task.scenario import STILL
+from usm_gym.task.spatial_scenario import NO_SCAN
 
 SPACE = {
     "observer_gain": Range(0.1, 100.0, "m/s^3"),
@@ -47,12 +49,14 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     entries = dict(registry._entries)
     entries["sta"] = replace(entries["sta"], space=SPACE)
     monkeypatch.setattr(registry, "_entries", entries)
-    sample = tuning.sample
+    sample = tuning.sample_of
 
     def brief(*arguments: Any) -> Any:
-        return replace(sample(*arguments), duration=1.0, settle_time=0.2, inspection=STILL)
+        scenario = sample(*arguments)
+        still = {"scan": NO_SCAN} if in_space(scenario.mode) else {"inspection": STILL}
+        return replace(scenario, duration=1.0, settle_time=0.2, **still)
 
-    monkeypatch.setattr(tuning, "sample", brief)
+    monkeypatch.setattr(tuning, "sample_of", brief)
 
 
 def problem(**changes: Any) -> Problem:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import warnings
 
 import gymnasium as gym
@@ -12,17 +13,22 @@ from support.episodes import NOISY
 
 import usm_gym
 
-IDS = ("USM-Operation-v0", "USM-Torpedo-v0")
-SPATIAL_IDS = ("USM-Operation3D-v0", "USM-Torpedo3D-v0")
-KEYS = {
-    "error_x",
-    "error_y",
-    "max_error_x",
-    "max_error_y",
-    "heading_error",
-    "thrust_effort",
-    "diverged",
-}
+PLANE, SPACE = "USM-Operation-v0", "USM-Operation3D-v0"
+IDS = (PLANE, "USM-Torpedo-v0", SPACE, "USM-Torpedo3D-v0")
+both = pytest.mark.parametrize("id", [PLANE, SPACE])
+
+
+def keys(env):
+    """The keys of an info."""
+    plane = len(env.unwrapped.world.axes) == 2
+    axes, angles = ("xy", ["heading"]) if plane else ("xyz", ["pitch", "yaw", "roll"])
+    errors = [f"{kind}_{axis}" for kind in ("error", "max_error") for axis in axes]
+    return {*errors, *(f"{angle}_error" for angle in angles), "thrust_effort", "diverged"}
+
+
+def actions(env, steps, size=1.0):
+    shape = steps, *env.action_space.shape
+    return np.random.default_rng(1).uniform(-size, size, shape).astype(np.float32)
 
 
 def rollout(env, steps, seed=0, policy_id="sta"):
@@ -39,10 +45,14 @@ def rollout(env, steps, seed=0, policy_id="sta"):
     return record
 
 
-@pytest.mark.parametrize("id", [*IDS, *SPATIAL_IDS])
-@pytest.mark.parametrize("render_mode", [None, "human", "rgb_array"])
-def test_checkers_have_no_complaint(id, checkers, render_mode):
-    env = gym.make(id, render_mode=render_mode).unwrapped
+@pytest.mark.parametrize(
+    ("id", "options"),
+    [(id, {}) for id in IDS]
+    + [(id, {"render_mode": mode}) for id in IDS for mode in ("human", "rgb_array")]
+    + [(SPACE, {"robot": "eely-neutral", "conditions": "sea"})],
+)
+def test_checkers_have_no_complaint(id, options, checkers):
+    env = gym.make(id, **options).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for check in checkers:
@@ -51,21 +61,28 @@ def test_checkers_have_no_complaint(id, checkers, render_mode):
 
 @pytest.mark.parametrize("id", IDS)
 def test_an_episode_is_truncated_at_its_duration(id):
-    record = rollout(gym.make(id), 3000)
+    env = gym.make(id)
+    record = rollout(env, 3000)
     assert len(record) - 1 == 2000
-    assert all(set(info) == KEYS for _, _, info in record)
+    assert all(set(info) == keys(env) for _, _, info in record)
     assert all(info["diverged"] == 0 for _, _, info in record)
 
 
-def test_observations_stay_inside_their_bounds_and_vary():
-    env = gym.make("USM-Operation-v0", conditions=NOISY)
+@pytest.mark.parametrize(("id", "size"), [(PLANE, 94), (SPACE, 74), (IDS[3], 74)])
+def test_observations_stay_inside_their_bounds_and_vary(id, size):
+    env = gym.make(id, conditions=NOISY)
     observations = np.array([o for o, _, _ in rollout(env, 2000)])
-    assert env.observation_space.shape == (94,)
+    assert env.observation_space.shape == (size,)
+    assert env.observation_space.dtype == observations.dtype == np.float32
     assert len(observations) == 2001
-    assert (np.abs(observations) < env.observation_space.high).sum() > 0
+    assert (np.abs(observations) < env.observation_space.high).all()
     assert all(env.observation_space.contains(o) for o in observations)
     layout = env.unwrapped.layout
     constant = {"thruster_limit"}
+    if id == SPACE:  # nothing but the reference 0 is asked of the attitude
+        constant |= {"reference_rates"}
+    if id == IDS[3]:  # a torpedo keeps its joints still
+        constant |= {name for name in layout.slices if name.startswith("joint_reference")}
     for name, part in layout.slices.items():
         assert (np.ptp(observations[:, part], axis=0).max() > 0) == (name not in constant), name
 
@@ -105,17 +122,19 @@ def test_observation_is_what_the_table_says():
     np.testing.assert_allclose(seen["thruster_command"], np.clip(action, -1, 1), **close)
 
 
-def test_info_is_numpy_scalars_that_json_takes():
-    env = gym.make("usm_gym:USM-Operation-v0")
+@both
+def test_info_is_numpy_scalars_that_json_takes(id):
+    env = gym.make(f"usm_gym:{id}")
     _, first = env.reset(seed=0)
-    *_, info = env.step(np.ones(5, np.float32))
+    *_, info = env.step(env.action_space.high)
     for each in (first, info):
         assert {type(value) for value in each.values()} == {np.float64}
         assert json.loads(json.dumps(each)) == each
 
 
-def test_equal_seeds_give_equal_bits_and_others_do_not():
-    first, second, third = (rollout(gym.make("USM-Operation-v0"), 300, seed) for seed in (7, 7, 8))
+@pytest.mark.parametrize("id", IDS)
+def test_equal_seeds_give_equal_bits_and_others_do_not(id):
+    first, second, third = (rollout(gym.make(id), 300, seed) for seed in (7, 7, 8))
     for (a, r, i), (b, s, j) in zip(first, second, strict=True):
         assert (a == b).all()
         assert r == s
@@ -123,10 +142,17 @@ def test_equal_seeds_give_equal_bits_and_others_do_not():
     assert (first[-1][0] != third[-1][0]).any()
 
 
-@pytest.mark.parametrize("vector", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
-def test_gymnasiums_vector_environments_give_the_same_bits(vector):
+@pytest.mark.parametrize(
+    ("id", "vector"),
+    [
+        (PLANE, gym.vector.SyncVectorEnv),
+        (PLANE, gym.vector.AsyncVectorEnv),
+        (SPACE, gym.vector.SyncVectorEnv),
+    ],
+)
+def test_gymnasiums_vector_environments_give_the_same_bits(id, vector):
     def make():
-        return gym.make("usm_gym:USM-Operation-v0")
+        return gym.make(f"usm_gym:{id}")
 
     options = {"context": "spawn"} if vector is gym.vector.AsyncVectorEnv else {}
     envs = vector([make, make], **options)
@@ -135,8 +161,7 @@ def test_gymnasiums_vector_environments_give_the_same_bits(vector):
         batch, _ = envs.reset(seed=[3, 4])
         single = [env.reset(seed=seed)[0] for env, seed in zip(singles, (3, 4), strict=True)]
         assert (batch == np.stack(single)).all()
-        actions = np.random.default_rng(0).uniform(-1, 1, (60, 2, 5)).astype(np.float32)
-        for action in actions:
+        for action in actions(envs, 60):
             batch, rewards, *_ = envs.step(action)
             outcomes = [env.step(a) for env, a in zip(singles, action, strict=True)]
             assert (batch == np.stack([o[0] for o in outcomes])).all()
@@ -145,38 +170,57 @@ def test_gymnasiums_vector_environments_give_the_same_bits(vector):
         envs.close()
 
 
-def test_snapshot_and_restore_repeat_the_same_bits():
-    env = gym.make("USM-Operation-v0", conditions="basin")
-    actions = np.random.default_rng(1).uniform(-0.2, 0.2, (200, 5)).astype(np.float32)
+@pytest.mark.parametrize(("id", "conditions"), [(PLANE, "basin"), (SPACE, "basin"), (SPACE, "sea")])
+def test_snapshot_and_restore_repeat_the_same_bits(id, conditions):
+    env = gym.make(id, conditions=conditions)
+    given = actions(env, 200, 0.2)
     env.reset(seed=5)
-    for action in actions[:100]:
+    for action in given[:100]:
         env.step(action)
     snapshot = env.unwrapped.snapshot()
-    first = [env.step(action) for action in actions[100:]]
+    first = [env.step(action) for action in given[100:]]
     env.reset(seed=6)
     env.unwrapped.restore(snapshot)
-    second = [env.step(action) for action in actions[100:]]
+    second = [env.step(action) for action in given[100:]]
     for a, b in zip(first, second, strict=True):
         assert (a[0] == b[0]).all()
         assert a[1:] == b[1:]
 
 
-def test_a_lost_robot_ends_the_episode_with_a_finite_observation_and_the_bill():
-    env = gym.make("USM-Operation-v0")
+@pytest.mark.parametrize(("id", "worst"), [(PLANE, 10.35), (SPACE, 10.6)])
+def test_a_lost_robot_ends_the_episode_with_a_finite_observation_and_the_bill(id, worst):
+    env = gym.make(id)
     env.reset(options={"scenario": "nominal"})
     rewards = []
     while True:
-        observation, reward, terminated, truncated, info = env.step(np.ones(5, np.float32))
+        observation, reward, terminated, truncated, info = env.step(env.action_space.high)
         rewards.append(reward)
         if terminated or truncated:
             break
     assert terminated
     assert not truncated
     assert info["diverged"] == 1
-    assert max(abs(info["error_x"]), abs(info["error_y"])) > 0.5
+    assert max(abs(info[f"error_{axis}"]) for axis in env.unwrapped.world.axes) > 0.5
     assert env.observation_space.contains(observation)
-    # Lost in step k, it is charged 10.35 for that step and for each of the 2000 - k that remain.
-    assert rewards[-1] == pytest.approx(-10.35 * (1 + 2000 - len(rewards)))
+    # Lost in step k, it is charged so much for that step and for each of the 2000 - k that remain.
+    assert rewards[-1] == pytest.approx(-worst * (1 + 2000 - len(rewards)))
+    assert -worst < min(rewards[:-1])
+
+
+def test_the_reward_is_that_of_the_documentation():
+    for id, angles in ((PLANE, ["heading"]), (SPACE, ["pitch", "yaw"])):
+        env = gym.make(id)
+        env.reset(seed=0)
+        limit, axes = env.unwrapped.conditions.thruster_limit, env.unwrapped.world.axes
+        for action in actions(env, 40, 0.3):
+            _, reward, *_, info = env.step(action)
+            e = np.abs([info[f"error_{axis}"] for axis in axes])
+            a = np.degrees(np.abs([info[f"{angle}_error"] for angle in angles]))
+            expected = -10.0 * np.mean(e / (e + 0.02)) - 0.25 * np.sum(a / (a + 20.0))
+            expected -= 0.1 * np.abs(action).mean()
+            assert reward == pytest.approx(expected, rel=1e-6)
+            effort = limit * np.abs(action).mean()
+            assert info["thrust_effort"] == pytest.approx(effort, rel=1e-6)
 
 
 def test_an_episode_that_is_over_waits_for_reset():
@@ -192,13 +236,14 @@ def test_an_episode_that_is_over_waits_for_reset():
     env.step(np.zeros(5, np.float32))
 
 
-def test_a_state_that_is_not_finite_is_reported():
-    env = gym.make("USM-Operation-v0", conditions={"integrator": "explicit"})
+@both
+def test_a_state_that_is_not_finite_is_reported(id):
+    env = gym.make(id, conditions={"integrator": "explicit"})
     env.reset(seed=0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for _ in range(200):
-            observation, _, terminated, _, info = env.step(np.ones(5, np.float32))
+            observation, _, terminated, _, info = env.step(env.action_space.high)
             if terminated:
                 break
     assert terminated
@@ -222,80 +267,119 @@ def test_bad_actions_are_refused(action, message):
         env.step(action)
 
 
-def test_actions_beyond_the_bounds_saturate():
+@both
+def test_actions_beyond_the_bounds_saturate(id):
     outcomes = []
     for size in (1.0, 50.0, np.inf):
-        env = gym.make("USM-Operation-v0")
+        env = gym.make(id)
         env.reset(seed=0)
-        outcomes.append(env.step(np.full(5, size, np.float32)))
+        outcomes.append(env.step(size * env.action_space.high))
     assert (outcomes[0][0] == outcomes[1][0]).all()
     assert (outcomes[0][0] == outcomes[2][0]).all()
-    assert outcomes[0][4]["thrust_effort"] == 20.0
+    assert outcomes[0][4]["thrust_effort"] == env.unwrapped.conditions.thruster_limit
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("id", "arguments", "message"),
     [
-        ({"conditions": "stormy"}, "conditions is 'stormy'; allowed: ideal, field, basin, sea"),
-        ({"conditions": {"noise": 1.0}}, "noise"),
-        ({"conditions": {"position_noise": -1.0}}, "greater than or equal to 0"),
-        ({"robot": {"links": 1}}, "links is 1"),
-        ({"robot": {"thrusters": ()}}, "thrusters is \\(\\)"),
-        ({"robot": 3}, "robot is 3"),
-        ({"conditions": {"thruster_limit": 5000.0}}, "thruster_limit"),
-        ({"render_mode": "holographic"}, "render_mode"),
+        *(
+            (id, *refused)
+            for id in (PLANE, SPACE)
+            for refused in (
+                ({"conditions": "stormy"}, "conditions is 'stormy'; allowed: ideal, field, basin"),
+                ({"conditions": {"noise": 1.0}}, "noise"),
+                ({"conditions": {"position_noise": -1.0}}, "greater than or equal to 0"),
+                ({"conditions": {"thruster_limit": 5000.0}}, "thruster_limit"),
+                ({"robot": {"thrusters": ()}}, "thrusters is \\(\\)"),
+                ({"robot": 3}, "robot is 3"),
+                ({"mode": "diving"}, "mode is 'diving'; allowed: operation"),
+            )
+        ),
+        (PLANE, {"robot": {"links": 1}}, "links is 1"),
+        (PLANE, {"robot": "eely"}, "robot is 'eely'; allowed: paper$"),
+        (PLANE, {"mode": "operation3d"}, "mode is 'operation3d'; allowed: operation or torpedo"),
+        (PLANE, {"render_mode": "holographic"}, "render_mode"),
+        (SPACE, {"robot": {"links": ()}}, "links is \\(\\)"),
+        (SPACE, {"robot": "paper"}, "robot is 'paper'; allowed: eely, eely-neutral$"),
+        (SPACE, {"mode": "operation"}, "mode is 'operation'; allowed: operation3d or torpedo3d"),
     ],
 )
-def test_bad_arguments_are_refused(arguments, message):
+def test_bad_arguments_are_refused(id, arguments, message):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        with pytest.raises(ValueError, match=message):
-            gym.make("USM-Operation-v0", **arguments)
+        with pytest.raises(ValueError, match=message) as refusal:
+            gym.make(id, **arguments)
+    assert "\n" not in str(refusal.value)
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("id", "options", "message"),
     [
-        ({"scenario": "hard"}, "scenario is 'hard'; allowed: nominal, table1"),
-        ({"scenarios": "nominal"}, "options"),
-        ({"scenario": 3}, "scenario is 3"),
-        ({"scenario": {"mode": "torpedo"}}, "mode"),
-        ({"scenario": {"noise_seed": "7"}}, "noise_seed"),
-        ({"scenario": {"path": {"speed": "fast"}}}, "speed"),
-        ({"scenario": {"inspection": {"bending_joints": 16}}}, "bending_joints is 16"),
+        (PLANE, {"scenario": "hard"}, "scenario is 'hard'; allowed: nominal, table1"),
+        (SPACE, {"scenario": "table1"}, "scenario is 'table1'; allowed: nominal$"),
+        *(
+            (id, *refused)
+            for id in (PLANE, SPACE)
+            for refused in (
+                ({"scenarios": "nominal"}, "options"),
+                ({"scenario": 3}, "scenario is 3"),
+                ({"scenario": {"noise_seed": "7"}}, "noise_seed"),
+                ({"scenario": {"path": {"speed": "fast"}}}, "speed"),
+            )
+        ),
+        (PLANE, {"scenario": {"mode": "torpedo"}}, "mode"),
+        (SPACE, {"scenario": {"mode": "torpedo"}}, "mode is 'torpedo'"),
+        (SPACE, {"scenario": {"mode": "torpedo3d"}}, "the scenario's mode is 'torpedo3d'"),
+        (PLANE, {"scenario": usm_gym.suite("operation3d")[0]}, "scenario is SpatialScenario"),
+        (SPACE, {"scenario": usm_gym.suite("operation")[0]}, "scenario is Scenario"),
+        (SPACE, {"scenario": usm_gym.suite("operation3d-neutral")[0]}, "the scenario's robot"),
+        (PLANE, {"scenario": {"inspection": {"bending_joints": 16}}}, "bending_joints is 16"),
+        (SPACE, {"scenario": {"scan": {"bending_joints": 9}}}, "bending_joints is 9"),
+        (
+            SPACE,
+            {"scenario": {"scan": {"bending_joints": 1}}},
+            r"pans is \(0.8, -0.8, 0.0\).*joints",
+        ),
+        (SPACE, {"scenario": {"thruster_gains": [1.0] * 5}}, "thruster_gains.*7 thrusters"),
+        (SPACE, {"scenario": {"water": {"link_factors": [1.0] * 8}}}, "link_factors.*9 links"),
     ],
 )
-def test_bad_options_are_refused(options, message):
-    env = gym.make("USM-Operation-v0")
-    with pytest.raises(ValueError, match=message):
+def test_bad_options_are_refused(id, options, message):
+    env = gym.make(id)
+    with pytest.raises(ValueError, match=message) as refusal:
         env.reset(options=options)
+    assert "\n" not in str(refusal.value)
 
 
-def test_options_survive_the_spec():
+@both
+def test_options_survive_the_spec(id):
     arguments = {"conditions": {"thruster_limit": 12.0, "coefficient_range": [0.9, 1.1]}}
-    spec = gym.make("USM-Operation-v0", **arguments).spec
+    spec = gym.make(id, **arguments).spec
     env = gym.make(gym.envs.registration.EnvSpec.from_json(spec.to_json()))
     assert env.unwrapped.conditions.thruster_limit == 12.0
     assert env.unwrapped.conditions.coefficient_range == (0.9, 1.1)
 
 
-def test_a_scenario_brings_its_own_conditions():
-    scenario = usm_gym.suite("operation-ideal")[0]
-    env = gym.make("USM-Operation-v0", conditions="basin")
+@pytest.mark.parametrize(("id", "suite"), [(PLANE, "operation"), (SPACE, "operation3d")])
+def test_a_scenario_brings_its_own_conditions(id, suite):
+    env = gym.make(id, conditions="basin")
+    ideal = gym.make(id, conditions="ideal").unwrapped.conditions
+    scenario = usm_gym.suite(suite)[0].under(ideal)
     for given in (scenario, scenario.to_dict(), json.loads(json.dumps(scenario.to_dict()))):
         env.reset(options={"scenario": given})
         assert env.unwrapped.scenario == scenario
     assert env.unwrapped.nominal.thruster_time_constant == 0.0
 
 
-def test_nominal_knowledge_holds_no_truth():
-    env = gym.make("USM-Operation-v0", conditions="basin")
+@both
+def test_nominal_knowledge_holds_no_truth(id):
+    env = gym.make(id, conditions="basin")
     knowledge = []
     for seed in (0, 1):
         env.reset(seed=seed)
         knowledge.append(env.unwrapped.nominal)
     assert knowledge[0] == knowledge[1]
-    assert knowledge[0].robot == usm_gym.Robot()
+    assert knowledge[0].robot == (usm_gym.Robot() if id == PLANE else usm_gym.SpatialRobot())
 
 
 def test_other_robots_are_environments_too():
@@ -311,8 +395,28 @@ def test_other_robots_are_environments_too():
     assert rollout(env, 500)[-1][2]["diverged"] == 0
 
 
-def test_the_documentation_holds_the_table_of_the_observation():
-    env = gym.make("USM-Operation-v0").unwrapped
-    for name in env.layout.slices:
-        assert f"`{name}`" in type(env).__doc__
-    assert "OBSERVATION_TABLE" not in type(env).__doc__
+def test_other_robots_in_space_are_environments_too():
+    links = [{"length": 0.6}] * 5
+    axes = [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0)] * 2
+    ahead, left, up = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    places = [(2, left), (2, up), (4, left), (4, up), (3, ahead)]
+    thrusters = [
+        {"link": link, "position": (0.3, 0.0, 0.0), "direction": side} for link, side in places
+    ]
+    robot = {"links": links, "joint_axes": axes, "thrusters": thrusters}
+    env = gym.make(SPACE, robot=robot)
+    assert env.action_space.shape == (5,)
+    env.reset(options={"scenario": "nominal"})
+    assert env.unwrapped.scenario.scan.bending_joints == 2
+    assert rollout(env, 500)[-1][2]["diverged"] == 0
+
+
+@pytest.mark.parametrize(("id", "size"), [(PLANE, 94), (SPACE, 74)])
+def test_the_documentation_holds_the_table_of_the_observation(id, size):
+    env = gym.make(id).unwrapped
+    said = type(env).__doc__
+    rows = re.findall(r"\| (\d+)(?:-(\d+))? \| `(\w+)` \|", said)
+    table = {name: slice(int(first), int(last or first) + 1) for first, last, name in rows}
+    assert table == env.layout.slices
+    assert f"`Box(float32)` of {size} numbers" in said
+    assert "OBSERVATION_TABLE" not in said

@@ -9,13 +9,13 @@ from support.episodes import NOISY
 
 import usm_gym
 
-ID = "USM-Operation-v0"
+ID, SPACE = "USM-Operation-v0", "USM-Operation3D-v0"
 # Light thrusters and a strong current: some robots are lost soon, others late or never.
 HARD = {"thruster_limit": 3.0, "current_limit": 0.3}
 
 
-def native(count, **arguments):
-    return gym.make_vec(ID, num_envs=count, vectorization_mode="vector_entry_point", **arguments)
+def native(count, id=ID, **arguments):
+    return gym.make_vec(id, num_envs=count, vectorization_mode="vector_entry_point", **arguments)
 
 
 def same(a, b):
@@ -54,14 +54,19 @@ def test_every_autoreset_mode_is_gymnasiums_to_the_bit(mode):
     assert ends >= 5
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-@pytest.mark.parametrize("conditions", ["basin", "sea"])
-def test_in_basin_and_sea_many_have_the_bits_of_single_environments(conditions, threads):
-    envs = native(9, conditions=conditions, threads=threads)  # more than one block
-    reference = SyncVectorEnv([lambda: gym.make(ID, conditions=conditions) for _ in range(9)])
+@pytest.mark.parametrize(
+    ("id", "conditions", "threads"),
+    [
+        *((ID, conditions, threads) for conditions in ("basin", "sea") for threads in (1, 2)),
+        *((SPACE, "basin", 1), (SPACE, "sea", 2), ("USM-Torpedo3D-v0", "sea", 1)),
+    ],
+)
+def test_in_basin_and_sea_many_have_the_bits_of_single_environments(id, conditions, threads):
+    envs = native(9, id, conditions=conditions, threads=threads)  # more than one block
+    reference = SyncVectorEnv([lambda: gym.make(id, conditions=conditions) for _ in range(9)])
     assert same(envs.reset(seed=5)[0], reference.reset(seed=5)[0])
-    ends = 0
-    for action in np.random.default_rng(0).uniform(-0.5, 0.5, (400, 9, 5)).astype(np.float32):
+    ends, shape = 0, (400, *envs.action_space.shape)
+    for action in np.random.default_rng(0).uniform(-0.5, 0.5, shape).astype(np.float32):
         ours, theirs = envs.step(action), reference.step(action)
         for a, b in zip(ours, theirs, strict=True):
             assert same(a, b)
@@ -109,11 +114,12 @@ def test_the_number_of_threads_changes_no_bit():
     assert (record[0] == record[2]).all()
 
 
-def test_scenarios_for_all_and_for_each():
-    envs = native(3)
+@pytest.mark.parametrize(("id", "name"), [(ID, "operation"), (SPACE, "operation3d")])
+def test_scenarios_for_all_and_for_each(id, name):
+    envs = native(3, id)
     envs.reset(options={"scenario": "nominal"})
     assert len(set(envs.unwrapped.simulation.scenarios)) == 1
-    suite = usm_gym.suite("operation")
+    suite = usm_gym.suite(name)
     envs.reset(seed=0, options={"scenario": [suite[4], None, suite[5].to_dict()]})
     scenarios = envs.unwrapped.simulation.scenarios
     assert scenarios[0] == suite[4]
@@ -139,11 +145,13 @@ def test_without_autoreset_an_ended_episode_waits():
         ({"num_envs": 2, "threads": 0}, "threads is 0"),
         ({"num_envs": 2, "conditions": "wet"}, "conditions is 'wet'"),
         ({"num_envs": 2, "autoreset_mode": "Never"}, "Never"),
+        ({"num_envs": 2, "robot": "snake"}, "robot is 'snake'"),
     ],
 )
-def test_bad_arguments_are_refused(arguments, message):
+@pytest.mark.parametrize("id", [ID, SPACE])
+def test_bad_arguments_are_refused(id, arguments, message):
     with pytest.raises(ValueError, match=message):
-        gym.make_vec(ID, vectorization_mode="vector_entry_point", **arguments)
+        gym.make_vec(id, vectorization_mode="vector_entry_point", **arguments)
 
 
 def test_what_was_never_made_can_be_closed():

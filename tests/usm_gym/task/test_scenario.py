@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.episodes import assert_fills
 
 from usm_gym import Conditions, Scenario
 from usm_gym.robot import Robot, Thruster
@@ -34,16 +35,6 @@ DRAWS = 2000
 def drawn(mode: Mode, preset: str, count: int = DRAWS) -> list[Scenario]:
     random = np.random.default_rng(0)
     return [sample(mode, PRESETS[preset], random) for _ in range(count)]
-
-
-def assert_fills(values: Any, low: float, high: float) -> None:
-    """Assert that values lie between two bounds, evenly and up to both."""
-    values = np.asarray(values, float)
-    width = high - low
-    assert low <= values.min() <= low + 0.02 * width
-    assert high - 0.02 * width <= values.max() <= high
-    quarters = np.histogram(values, 4, (low, high))[0] / values.size
-    np.testing.assert_allclose(quarters, 0.25, atol=0.05)
 
 
 def everything() -> list[Scenario]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.episodes import seen_by
 
 from usm_gym import Conditions, Robot, Scenario
 from usm_gym.simulation import Simulation
@@ -45,11 +46,6 @@ def test_what_is_known_is_the_newest_that_has_arrived(
 ) -> None:
     missing = np.random.default_rng(period + delay).random(400) < share
     assert known(period, delay, missing).tolist() == arrivals(period, delay, missing.tolist())
-
-
-def seen_by(simulation: Simulation, robot: int = 0) -> dict[str, Array]:
-    values = simulation.observation[robot] * simulation.layout.scale
-    return {name: values[part] for name, part in simulation.layout.slices.items()}
 
 
 @pytest.mark.parametrize("robots", [1, 3])
