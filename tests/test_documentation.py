@@ -30,6 +30,7 @@ PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 # Options that are added to a command, by how it begins: the later one counts.
 BUDGETS = {
     "usm policies": "",
+    "usm evaluate --suite": "--policies zero",
     "usm evaluate": "--mode operation --episodes 2",
     "usm compare": "--mode operation --episodes 2",
     "usm robustness --vary delay": "--values 1 --episodes 2",

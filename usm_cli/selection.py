@@ -18,7 +18,7 @@ from usm_baselines.benchmark.scoring import (
     score_all,
 )
 from usm_baselines.contender import Contender
-from usm_baselines.tiers import competitors, short_list
+from usm_baselines.tiers import TIERS, competitors, short_list
 
 from usm_cli.options import add_computing, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
@@ -117,8 +117,8 @@ def suite_name(arguments: argparse.Namespace) -> str | None:
 
     The conditions of a tier have a suite of their own, as their joint motion is another.
     """
-    default = f"operation-{arguments.conditions}"
-    default = default if default in NAMES else "operation"
+    tier = arguments.conditions
+    default = f"operation-{tier}" if tier in TIERS else "operation"
     return None if sampled(arguments) else arguments.suite or default
 
 

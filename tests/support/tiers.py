@@ -9,10 +9,12 @@ from typing import Any
 
 import pytest
 from usm_baselines import registry
+from usm_baselines.gains import FOLDERS
 
-from usm_gym.task.conditions import PRESETS
+from usm_gym.task.conditions import IN_SPACE, PRESETS, SPATIAL_PRESETS
 
-TIERS = ("field", "basin", "sea")
+IN_THE_PLANE = ("field", "basin", "sea")
+TIERS = (*IN_THE_PLANE, *(tier + IN_SPACE for tier in IN_THE_PLANE))
 
 
 def gains_file(path: Path, policy: str, tier: str | None, **gains: float) -> Path:
@@ -20,17 +22,17 @@ def gains_file(path: Path, policy: str, tier: str | None, **gains: float) -> Pat
     data: dict[str, Any] = {"policy": policy, "gains": gains, "weight": 0.002}
     data["budget"] = {"trials": 9, "episodes": 8}
     if tier is not None:
-        data["conditions"] = asdict(PRESETS[tier])
+        presets = PRESETS if tier in PRESETS else SPATIAL_PRESETS
+        data["conditions"] = asdict(presets[tier.removesuffix(IN_SPACE)])
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(data))
     return path
 
 
 def register_with_tiers(monkeypatch: pytest.MonkeyPatch, folder: Path, id: str) -> None:
-    """Register a PD law whose gain is 1 in the field, 2 in the basin, and 3 at sea."""
+    """Register a PD law whose gain is 1 in the field, 2 in the basin, 3 at sea, more in space."""
     monkeypatch.setattr(registry, "_entries", dict(registry._entries))
     monkeypatch.setattr(registry, "TUNED", folder)
-    for k, tier in enumerate(TIERS, start=1):
-        within = folder if tier == "field" else folder / tier
-        gains_file(within / f"{id}.json", id, tier, k_p=float(k))
+    for k, (within, tier) in enumerate(zip(FOLDERS.values(), TIERS, strict=True), start=1):
+        gains_file(folder / within / f"{id}.json", id, tier, k_p=float(k))
     registry.register(id, registry.entry("pd").factory, "made up")

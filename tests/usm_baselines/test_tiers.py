@@ -1,5 +1,6 @@
 """Policies with gains for a tier are there, and are scored where they are meant to be."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from usm_baselines.gains import FOLDERS
 from usm_baselines.tiers import PAPER, meant_for, tier_of
 
 from usm_gym.support.validation import UsageError
-from usm_gym.task.conditions import PRESETS, Conditions
+from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS, Conditions
 from usm_gym.task.sampling import named
 
 
@@ -22,7 +23,7 @@ def _tiers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_gains_of_every_tier_are_registered_under_its_name() -> None:
     nominal = named("nominal", "operation").nominal
-    assert registry.ids()[-4:] == ["mine", "mine-tuned", "mine-basin", "mine-sea"]
+    assert registry.ids()[-7:] == ["mine", *(f"mine-{suffix}" for suffix in FOLDERS)]
     for gain, (suffix, tier) in enumerate(zip(FOLDERS, TIERS, strict=True), start=1):
         policy: Any = registry.make(f"mine-{suffix}", nominal)
         assert policy.gains.k_p == gain
@@ -51,11 +52,20 @@ def test_a_tier_is_for_its_own_policies_the_papers_and_those_that_see_the_truth(
         )
 
 
+def test_in_space_policies_are_for_the_robot_there() -> None:
+    field = meant_for(SPATIAL_PRESETS["field"], "operation3d")
+    assert {*PAPER, "mine-eely"} <= set(field)
+    assert not {"mine", "mine-tuned", "mine-basin", "mine-eely-sea"} & set(field)
+    assert meant_for(replace(SPATIAL_PRESETS["field"], thruster_limit=9.0), "torpedo3d") == field
+    assert "mine-eely-sea" in meant_for(SPATIAL_PRESETS["sea"], "operation3d")
+
+
 @pytest.mark.parametrize(
     "conditions", [PRESETS["field"], PRESETS["ideal"], Conditions(thruster_limit=9.0)]
 )
 def test_all_other_conditions_are_for_all_but_policies_of_tiers(conditions: Conditions) -> None:
     assert tier_of(conditions) == "field"
     left_out = [id for id in registry.ids() if id not in meant_for(conditions)]
-    assert all(registry.entry(id).tuned_for in ("basin", "sea") for id in left_out)
+    others = [tier for tier in TIERS if tier != "field"]
+    assert all(registry.entry(id).tuned_for in others for id in left_out)
     assert {"mine-basin", "mine-sea"} <= set(left_out)

@@ -23,6 +23,7 @@ from usm_gym.statistics import compare, interquartile_mean, interval, told_apart
 from usm_gym.suites import NAMES, suite
 from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
+from usm_gym.task.conditions import IN_SPACE
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
 from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import shared_nominal
@@ -166,8 +167,8 @@ class Place:
 
 
 def suites() -> dict[str, list[AnyScenario]]:
-    """The frozen suites, and the control row: the main one with the joints still."""
-    chosen = {name: suite(name) for name in NAMES}
+    """The frozen suites in the plane, and the control row: the main one with the joints still."""
+    chosen = {name: suite(name) for name in NAMES if IN_SPACE not in name}
     chosen[STILL] = [
         replace(scenario, conditions=replace(scenario.conditions, motion=False))
         for scenario in chosen[MAIN]
