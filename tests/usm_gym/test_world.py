@@ -77,7 +77,7 @@ def errors_of(scores):
     return [scores.per_episode[f"max_error_{axis}"] for axis in "xyz"]
 
 
-def test_a_law_that_needs_the_planar_robot_says_so():
-    for id in ("lqg", "mpc", "lqg-joints", "oracle"):
+def test_a_law_that_foresees_the_robot_says_so_where_none_can():
+    for id in ("lqg-joints", "mpc", "adaptive", "informed"):
         with pytest.raises(ValueError, match="robot is"):
             usm_baselines.make(id, BallScenario().nominal)
