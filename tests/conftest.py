@@ -65,6 +65,7 @@ def browser(tmp_path_factory):
         "--headless=new",
         "--no-sandbox",
         "--disable-gpu",
+        "--enable-unsafe-swiftshader",  # draws WebGL without a graphics card
         "--disable-quic",
         "--disable-background-networking",
         "--disable-component-update",

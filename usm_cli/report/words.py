@@ -84,12 +84,15 @@ def bends(scenario: AnyScenario) -> str:
     if isinstance(scenario, SpatialScenario):
         scan = scenario.scan
         looks = [direction(*angles) for angles in zip(scan.pans, scan.tilts, strict=True)]
-        seen = zip(looks, scan.times, strict=True)
-        return f"the head looks {listed([f'{look} at {time:.1f} s' for look, time in seen])}"
+        return f"the head looks {listed(_at(looks, scan.times))}"
     inspection = scenario.inspection
-    at = zip(inspection.deflections, inspection.times, strict=True)
-    turned = listed([f"{math.degrees(angle):+.0f}° at {time:.1f} s" for angle, time in at])
-    return f"the last {inspection.bending_joints} joints bend by {turned.replace('-', '−')}"
+    angles = [f"{math.degrees(angle):+.0f}°" for angle in inspection.deflections]
+    turned = listed(_at(angles, inspection.times)).replace("-", "−")
+    return f"the last {inspection.bending_joints} joints bend by {turned}"
+
+
+def _at(words: Iterable[str], times: Iterable[float]) -> list[str]:
+    return [f"{word} at {time:.1f} s" for word, time in zip(words, times, strict=True)]
 
 
 def direction(pan: float, tilt: float) -> str:
