@@ -249,7 +249,7 @@ def signals_of(
     observation: NDArray[np.float32], model: Model, world: World, navigated: bool = False
 ) -> Signals:
     """Signals of a batch; the allocation is in, `sense` and a navigator fill in the rest."""
-    size = len(observation)
+    size = observation.shape[0]
     y, u, velocity, acceleration, rate, disturbance, thrust = np.empty((7, size, model.axes))
     allocation = np.empty((size, rows_of(model), model.thrusters))
     world.allocate(observation, allocation)

@@ -190,7 +190,7 @@ class Residual:
         Returns:
             Observations, (batch, layout.size), and what to keep.
         """
-        size = len(observation)
+        size = observation.shape[0]
         if memory is None:
             start = np.ones(size, bool)
             base_state, filtered = None, None
@@ -232,7 +232,7 @@ class Residual:
             assert memory.known is not None
             command, base_state = self._corrected.decide(memory.known, self._correction(action))
             return command, memory._replace(action=action, base_state=base_state)
-        command = np.empty_like(memory.base_action)
+        command = np.empty(memory.base_action.shape, np.float32)
         residual = self._scale * action.astype(np.float64)
         as_wrench = self._action != "thrusters"
         correct_all(

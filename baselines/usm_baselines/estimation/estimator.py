@@ -75,7 +75,7 @@ class Estimator:
         Returns:
             What is known, and the state for the next call.
         """
-        model, size, shared = self._model, len(observation), self._shared
+        model, size, shared = self._model, observation.shape[0], self._shared
         if state is None:
             new = np.zeros((size, shared + self._navigator.size))
         else:
