@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.support.ball import BallScenario
 from usm_baselines.estimation.foresight import CURRENT, Foresight, foresight_of
 
+from tests.support.ball import BallScenario
 from usm_gym import Scenario
 from usm_gym.simulation import Simulation
 from usm_gym.spatial_robot import EELY
