@@ -19,7 +19,7 @@ from usm_baselines.policy import Percept, ScriptedPolicy
 from usm_baselines.signals import Signals
 
 from tests.support.signals import made_signals
-from usm_gym import Robot
+from usm_gym import Robot, evaluate
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.observation import ObservationLayout
 from usm_gym.task.sampling import named
@@ -230,10 +230,17 @@ def test_laws_do_not_know_how_many_axes_there_are(id: str) -> None:
         started, y = np.ones(2), y + 0.01
 
 
-@pytest.mark.parametrize("id", ["lqg", "lqg-joints", "mpc", "oracle"])
-def test_laws_of_the_planar_robot_refuse_others(id: str) -> None:
-    with pytest.raises(ValueError, match=r"robot is Ball\(.*\); allowed: the planar robot"):
+@pytest.mark.parametrize("id", ["lqg-joints", "mpc", "sta-navigator"])
+def test_laws_that_foresee_refuse_robots_that_nothing_foresees(id: str) -> None:
+    with pytest.raises(ValueError, match=r"robot is Ball\(.*\); allowed: one whose motion"):
         usm_baselines.make(id, BallScenario().nominal)
+
+
+@pytest.mark.parametrize("id", ["lqg", "dob"])
+def test_laws_on_the_linear_model_need_no_more_than_the_straight_body(id: str) -> None:
+    policy = usm_baselines.make(id, BallScenario().nominal)
+    scores = evaluate(policy, [BallScenario()]).per_episode
+    assert max(scores[f"max_error_{axis}"][0] for axis in "xyz") < 1e-3
 
 
 def angles(observation: NDArray[np.float32]) -> Array:

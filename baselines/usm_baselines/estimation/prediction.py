@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from usm_baselines.estimation import kalman
 from usm_baselines.estimation.foresight import (
     CURRENT,
-    NAMES,
     estimates_of,
     foresight_of,
     gains_from,
 )
+from usm_baselines.estimation.foresight import NAMES as NAMES
 from usm_baselines.estimation.late_filter import memory_size, navigate
 from usm_baselines.estimation.navigator import is_needed, navigation, transition_of
 from usm_baselines.signals import Array, Model, Signals, commanded, model_of, physical

@@ -7,8 +7,9 @@ import pytest
 from usm_baselines import registry
 
 from usm_gym.simulation import Simulation
-from usm_gym.task.conditions import PRESETS
+from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS
 from usm_gym.task.sampling import sample
+from usm_gym.task.spatial_sampling import sample_in_space
 
 # Where the current is among what is learnt.
 CURRENT = slice(6, 8)
@@ -27,7 +28,7 @@ def swim(scenarios, seconds):
     law = registry.make("adaptive", scenarios[0].nominal, **GAINS)
     simulation, state = Simulation(scenarios), None
     start = np.ones(len(scenarios), bool)
-    for _ in range(round(seconds / STEADY.control_period)):
+    for _ in range(round(seconds / scenarios[0].conditions.control_period)):
         action, state = law.predict(simulation.observation, state, start)
         start[:] = False
         simulation.step(action)
@@ -77,6 +78,24 @@ def test_the_more_it_swims_the_more_it_knows() -> None:
     _, early = swim(scenarios, 4.0)
     _, late = swim(scenarios, 30.0)
     assert (late[:, 1] < 0.5 * early[:, 1]).all()
+
+
+def test_in_space_added_mass_current_and_gains_are_found() -> None:
+    conditions = replace(
+        SPATIAL_PRESETS["basin"], current_variation=0.0, coefficient_spread=0.0, position_noise=2e-4
+    )
+    drawn = [sample_in_space("operation3d", conditions, np.random.default_rng(k)) for k in range(8)]
+    beliefs, uncertainty = swim(drawn, 30.0)
+    off = beliefs - np.stack(list(map(truth_of, drawn)))
+    guess = np.ones(beliefs.shape[1])
+    guess[6:9] = 0.0
+    before = np.sqrt(np.mean((guess - (beliefs - off)) ** 2, axis=0))
+    after = np.sqrt(np.mean(off**2, axis=0))
+    # Added mass across, current to the side and up, gains: what moves it to the side and up.
+    moving = [1, 7, 8, *range(9, 16)]
+    assert np.mean(after[moving] / before[moving]) < 0.7
+    assert after[1] < 0.6 * before[1]
+    assert np.median(np.abs(off / uncertainty)) < 2.0
 
 
 @pytest.mark.parametrize("batch", [1, 3])

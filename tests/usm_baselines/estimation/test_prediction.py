@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+import pytest
 import usm_baselines
 from usm_baselines.estimation.prediction import Predictor
 from usm_baselines.signals import Signals
@@ -11,8 +12,10 @@ from usm_baselines.signals import Signals
 from tests.support.signals import made_signals
 from usm_gym import Robot, Scenario, evaluate
 from usm_gym.simulation import Simulation
-from usm_gym.task.conditions import PRESETS
+from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS
 from usm_gym.task.sampling import named
+from usm_gym.task.spatial_scenario import Scan, SpatialScenario
+from usm_gym.world import world_of
 
 ROBOT = Robot()
 # Nothing unknown but the start: nominal water at rest, no noise, thrusters with their lag.
@@ -23,6 +26,12 @@ def scenario(**changes: Any) -> Scenario:
     known = named("nominal", "operation", KNOWN)
     motion = dataclasses.replace(known.inspection, times=(1.0, 2.0, 9.0), filter_frequency=9.0)
     return dataclasses.replace(known, inspection=motion, duration=4.0, settle_time=0.5, **changes)
+
+
+def in_space() -> SpatialScenario:
+    known = dataclasses.replace(SPATIAL_PRESETS["ideal"], thruster_time_constant=0.1)
+    scan = Scan(times=(1.0, 2.5), pans=(0.5, -0.5), tilts=(0.6, -0.6))
+    return SpatialScenario(conditions=known, scan=scan, duration=4.0, settle_time=0.5)
 
 
 def signals(simulation: Simulation, started: bool) -> Signals:
@@ -58,13 +67,17 @@ def test_the_nominal_plant_is_foreseen() -> None:
     assert np.abs(moved).max() > 1e-4
 
 
-def test_joint_motion_that_is_foreseen_disturbs_little() -> None:
+@pytest.mark.parametrize(
+    ("episode", "weight"), [(scenario(), 5e-5), (in_space(), 5e-6)], ids=["plane", "space"]
+)
+def test_joint_motion_that_is_foreseen_disturbs_little(episode: Any, weight: float) -> None:
     """Noise of the laws' filters as in field, so that their gains are the same."""
-    nominal = dataclasses.replace(scenario().nominal, position_noise=5e-5)
+    nominal = dataclasses.replace(episode.nominal, position_noise=5e-5)
     worst = {}
     for id in ("lqg", "lqg-joints", "mpc"):
-        gains = {"disturbance_noise": 0.1, "variation_weight": 5e-5}
-        scores = evaluate(usm_baselines.make(id, nominal, **gains), [scenario()]).per_episode
-        worst[id] = np.array([scores["max_error_x"][0], scores["max_error_y"][0]])
+        gains = {"disturbance_noise": 0.1, "variation_weight": weight}
+        scores = evaluate(usm_baselines.make(id, nominal, **gains), [episode]).per_episode
+        axes = world_of(episode.body).axes
+        worst[id] = np.array([scores[f"max_error_{axis}"][0] for axis in axes])
     assert (worst["lqg-joints"] < 0.35 * worst["lqg"]).all()
     assert (worst["mpc"] < 0.35 * worst["lqg"]).all()
