@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Strict, TypeAdapter
+from pydantic import BeforeValidator, Field, Strict, TypeAdapter
 
 from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robots import EELY, name_of, spatial_robot_of
@@ -36,6 +36,15 @@ Amplitude = Annotated[Number, Field(ge=-100, le=100)]
 Angle = Annotated[Number, Field(ge=-100, le=100)]
 Angles = tuple[Angle, ...]
 Times = Annotated[tuple[Time, ...], Field(max_length=MAX_SHIFTS)]
+
+
+def _on_field(value: Any) -> Any:
+    """Fields of conditions on top of those of the preset "field" in space."""
+    fields = dataclasses.asdict(SPATIAL_PRESETS["field"])
+    return fields | value if isinstance(value, dict) else value
+
+
+SpatialConditions = Annotated[Conditions, BeforeValidator(_on_field)]
 
 
 @validated
@@ -129,7 +138,7 @@ class SpatialScenario:
     mode: SpatialMode = "operation3d"
     path: SpatialPath = SpatialPath()
     scan: Scan = Scan()
-    conditions: Conditions = SPATIAL_PRESETS["field"]
+    conditions: SpatialConditions = SPATIAL_PRESETS["field"]
     water: SpatialWater = SpatialWater()
     thruster_gains: tuple[Coefficient, ...] = ()
     duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0
