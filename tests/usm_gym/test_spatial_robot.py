@@ -28,7 +28,8 @@ def with_thruster(**fields: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"joint_axes": [(0, 0, 2)] * 8}, r"joint_axes, joint 1 is \(0.0, 0.0, 2.0\).*unit vector"),
+        ({"joint_axes": [(0, 0.6, 0.6)] * 8}, r"joint_axes, joint 1 is \(0.0, 0.6, 0.6\).*unit"),
+        ({"joint_axes": [(0, 0, 2)] * 8}, "joint_axes.*less than or equal to 1"),
         ({"joint_axes": [(0.0, 0.0, 1.0)] * 7}, "joint_axes is .*; allowed: 8 axes"),
         ({"joint_axes": [(0.0, 1.0)] * 8}, "joint_axes"),
         (with_thruster(direction=(1.0, 1.0, 0.0)), "direction of the thruster on link 5.*unit"),

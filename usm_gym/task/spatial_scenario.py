@@ -81,7 +81,7 @@ class Scan:
         bending_joints: How many joints bend, counted from the head, 1 to 63.
         times: When pan and tilt change, up to 16 rising times, 0 to 3600 s.
         pans: To what the pan changes at those times, -100 to 100 rad.
-        tilts: The same of the tilt.
+        tilts: The same of the tilt, -100 to 100 rad.
         filter_frequency: Natural frequency of the critically damped second-order filter between
             those steps and the joint references, 0.01 to 1000 rad/s; None leaves them steps.
     """
