@@ -10,10 +10,29 @@ from usm_agents.artifact.folder import Agent
 from usm_agents.learning.plan import Plan
 from usm_baselines.gains import Budget, GainsFile
 
-from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water, Wave
+from usm_gym import (
+    Conditions,
+    Inspection,
+    Link,
+    Path,
+    Robot,
+    Scan,
+    Scenario,
+    SpatialPath,
+    SpatialRobot,
+    SpatialScenario,
+    SpatialThruster,
+    SpatialWater,
+    SpatialWave,
+    Thruster,
+    Water,
+    Wave,
+)
 
 CLASSES = [
     *(Robot, Thruster, Conditions, Path, Inspection, Water, Wave, Scenario),
+    *(SpatialRobot, Link, SpatialThruster, SpatialPath, Scan, SpatialWater, SpatialWave),
+    SpatialScenario,
     *(Plan, Agent, GainsFile, Budget),
 ]
 NUMBER = r"(?<![\w.^])-?\d+(?:\.\d+)?(?:e-?\d+)?"

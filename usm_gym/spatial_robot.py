@@ -20,6 +20,9 @@ from usm_gym.support.validation import Count, Number, build, require, validated
 
 Array = NDArray[np.float64]
 Vector = tuple[Number, Number, Number]
+Component = Annotated[Number, Field(ge=-1, le=1)]
+Direction = tuple[Component, Component, Component]
+Coordinate = Annotated[Number, Field(ge=-50, le=50)]
 Coefficient = Annotated[Number, Field(ge=0, le=100)]
 
 MOST_LINKS = 64
@@ -41,7 +44,7 @@ class Link:
         length: Length, 0.01 to 10 m.
         radius: Radius, 0.001 to 10 m.
         mass: Mass, 0.001 to 100000 kg; None: that of the water it displaces.
-        keel: How far its centre of mass lies below its axis, 0 m to its radius.
+        keel: How far its centre of mass lies below its axis, 0 to 10 m, at most its radius.
     """
 
     length: Annotated[Number, Field(ge=0.01, le=10)]
@@ -60,15 +63,16 @@ class SpatialThruster:
     """A thruster.
 
     Attributes:
-        link: Number of the link that carries it, 1 = tail.
-        position: Where it pushes, in link axes from the middle of the link's tail end, m: x within
-            the link, y and z up to 5 radii from its axis.
-        direction: Where a positive force pushes the link, a unit vector in link axes.
+        link: Number of the link that carries it, 1 (tail) to 64.
+        position: Where it pushes, in link axes from the middle of the link's tail end, -50 to 50 m:
+            x within the link, y and z up to 5 radii from its axis.
+        direction: Where a positive force pushes the link, a unit vector in link axes, whose
+            components are -1 to 1.
     """
 
     link: Annotated[Count, Field(le=MOST_LINKS)]
-    position: Vector
-    direction: Vector
+    position: tuple[Coordinate, Coordinate, Coordinate]
+    direction: Direction
 
     def __post_init__(self) -> None:
         """Refuse a direction that is not a unit vector."""
@@ -111,13 +115,13 @@ class SpatialRobot:
     Attributes:
         links: The 2 to 64 links, from the tail; a keel of 3 cm is assumed.
         joint_axes: Axis of joint i, about which link i + 1 turns against link i, right-handed: a
-            unit vector in the axes of both.
+            unit vector in the axes of both, whose components are -1 to 1.
         thrusters: The 5 to 64 thrusters in the order of every thruster vector.
         water_density: Density of the water, 0.001 to 10000 kg/m^3.
         gravity: Acceleration of gravity, 0 to 100 m/s^2.
         added_mass_along: Added mass of a link along its axis over that of the displaced water, 0 to
             100.
-        added_mass_across: The same across its axis.
+        added_mass_across: The same across its axis, 0 to 100.
         linear_drag: Linear drag across a link over density, radius and length, 0 to 100 m/s; along
             it and in roll a tenth of that.
         surge_drag: Quadratic drag along a link, by its section, 0 to 100.
@@ -130,7 +134,7 @@ class SpatialRobot:
     links: Annotated[tuple[Link, ...], Field(min_length=2, max_length=MOST_LINKS)] = tuple(
         Link(length, keel=0.03) for length in EELY_LENGTHS
     )
-    joint_axes: tuple[Vector, ...] = (Z, Y, Z, Y, Z, Y, Z, Y)
+    joint_axes: tuple[Direction, ...] = (Z, Y, Z, Y, Z, Y, Z, Y)
     thrusters: Annotated[tuple[SpatialThruster, ...], Field(min_length=5, max_length=64)] = (
         EELY_THRUSTERS
     )

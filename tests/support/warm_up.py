@@ -3,7 +3,8 @@
     python tests/support/warm_up.py robots
     python tests/support/warm_up.py laws
 
-The two parts share few kernels, and so may run side by side.
+The two parts share few kernels, and so may run side by side. Of those of the robot in space, which
+take longest, one has those for a single robot and the other those for many.
 """
 
 import sys
@@ -22,29 +23,33 @@ from usm_gym.task.scenario import STILL
 from usm_gym.world import world_of
 
 TASKS = ("USM-Operation-v0", "usm_agents:USM-OperationResidual-v0")
+SPACE = "USM-Operation3D-v0"
 
 
 def brief(scenario):
     return replace(scenario, duration=0.1, settle_time=0.02, inspection=STILL)
 
 
+def step(env):
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+
+
 def robots():
     """Simulations, environments, and the reproduction of the paper."""
+    step(gym.make(SPACE))
     for conditions in ("field", "basin"):
         for task in TASKS:
-            env = gym.make(task, conditions=conditions)
-            env.reset(seed=0)
-            env.step(env.action_space.sample())
-            envs = gym.make_vec(task, 2, "vector_entry_point", conditions=conditions)
-            envs.reset(seed=0)
-            envs.step(envs.action_space.sample())
+            step(gym.make(task, conditions=conditions))
+            step(gym.make_vec(task, 2, "vector_entry_point", conditions=conditions))
     scenario = suite("operation")[0]
     evaluate(usm_baselines.make("zero", scenario.nominal), [brief(scenario)])
     run_cases([replace(case, scenario=brief(case.scenario)) for case in cases()], 1, lambda: None)
 
 
 def laws():
-    """Every policy that acts on observations alone."""
+    """Every policy that acts on observations alone, and many robots in space."""
+    step(gym.make_vec(SPACE, 2, "vector_entry_point"))
     for name in ("operation", "operation-basin"):
         nominal = suite(name)[0].nominal
         observation = np.zeros((1, world_of(nominal.robot).layout.size), np.float32)

@@ -8,22 +8,28 @@ from numpy.typing import NDArray
 
 from usm_gym import Conditions, Scenario, suite
 from usm_gym.simulation import Simulation
+from usm_gym.task.modes import AnyScenario
 
 STEPS = 40
-START = [replace(scenario, settle_time=0.0) for scenario in suite("operation")[:3]]
+Start = list[AnyScenario]
 
 
-def delayed(scenario: Scenario, **delays: int) -> Scenario:
+@pytest.fixture(params=["operation", "operation3d"])
+def start(request: pytest.FixtureRequest) -> Start:
+    return [replace(scenario, settle_time=0.0) for scenario in suite(request.param)[:3]]
+
+
+def delayed(scenario: AnyScenario, **delays: int) -> AnyScenario:
     return replace(scenario, conditions=replace(scenario.conditions, **delays))
 
 
-def actions(steps: int = STEPS, robots: int = 3) -> NDArray[np.float32]:
-    rng = np.random.default_rng(0)
-    return rng.uniform(-1.0, 1.0, (steps, robots, 5)).astype(np.float32)
+def actions(start: Start, steps: int = STEPS, robots: int = 3) -> NDArray[np.float32]:
+    shape = steps, robots, len(start[0].body.thrusters)
+    return np.random.default_rng(0).uniform(-1.0, 1.0, shape).astype(np.float32)
 
 
 def positions(simulation: Simulation, given: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Return the positions after every step, (steps, robots, 2)."""
+    """Return the positions after every step, (steps, robots, axes)."""
     path = []
     for action in given:
         simulation.step(action)
@@ -31,34 +37,34 @@ def positions(simulation: Simulation, given: NDArray[np.float32]) -> NDArray[np.
     return np.array(path)
 
 
-def test_a_late_command_does_what_it_would_have_done_then() -> None:
-    given, waits = actions(), (0, 1, 4)
-    late = Simulation([delayed(s, action_delay=d) for s, d in zip(START, waits, strict=True)])
+def test_a_late_command_does_what_it_would_have_done_then(start: Start) -> None:
+    given, waits = actions(start), (0, 1, 4)
+    late = Simulation([delayed(s, action_delay=d) for s, d in zip(start, waits, strict=True)])
     shifted = np.zeros_like(given)
     for robot, wait in enumerate(waits):
         shifted[wait:, robot] = given[: STEPS - wait, robot]
-    np.testing.assert_array_equal(positions(late, given), positions(Simulation(START), shifted))
+    np.testing.assert_array_equal(positions(late, given), positions(Simulation(start), shifted))
 
 
-def test_the_command_in_effect_is_observed() -> None:
-    simulation = Simulation([delayed(START[0], action_delay=2)])
+def test_the_command_in_effect_is_observed(start: Start) -> None:
+    simulation = Simulation([delayed(start[0], action_delay=2)])
     place = simulation.layout.slices["thruster_command"]
-    given = actions(5, 1)
+    given = actions(start, 5, 1)
     seen = []
     for action in given:
         simulation.step(action)
         seen.append(simulation.observation[0, place].copy())
-    np.testing.assert_array_equal(seen[:2], np.zeros((2, 5)))
+    np.testing.assert_array_equal(seen[:2], np.zeros_like(given[:2, 0]))
     np.testing.assert_allclose(seen[2:], given[:3, 0], rtol=1e-6)
 
 
-def test_snapshots_hold_what_is_under_way() -> None:
-    scenarios = [delayed(s, action_delay=3, position_delay=2) for s in START]
-    simulation, given = Simulation(scenarios), actions()
+def test_snapshots_hold_what_is_under_way(start: Start) -> None:
+    scenarios = [delayed(s, action_delay=3, position_delay=2) for s in start]
+    simulation, given = Simulation(scenarios), actions(start)
     positions(simulation, given[:10])
     taken = simulation.snapshot()
     after = positions(simulation, given[10:]), simulation.observation.copy()
-    other = Simulation(START)  # which has kept nothing so far
+    other = Simulation(start)  # which has kept nothing so far
     for copy in (simulation, other):
         copy.restore(taken)
         again = positions(copy, given[10:]), copy.observation
@@ -66,12 +72,12 @@ def test_snapshots_hold_what_is_under_way() -> None:
         np.testing.assert_array_equal(again[1], after[1])
 
 
-def test_a_robot_that_waits_longer_changes_nothing_for_the_others() -> None:
-    scenarios = [delayed(s, action_delay=2, position_delay=2) for s in START]
-    given, alone, joined = actions(), Simulation(scenarios), Simulation(scenarios)
+def test_a_robot_that_waits_longer_changes_nothing_for_the_others(start: Start) -> None:
+    scenarios = [delayed(s, action_delay=2, position_delay=2) for s in start]
+    given, alone, joined = actions(start), Simulation(scenarios), Simulation(scenarios)
     for k, action in enumerate(given):
         if k == 7:
-            joined.start(1, delayed(START[1], action_delay=5, position_delay=9))
+            joined.start(1, delayed(start[1], action_delay=5, position_delay=9))
         alone.step(action)
         joined.step(action)
         for robot in (0, 2):

@@ -100,6 +100,44 @@ def test_workers_do_not_matter() -> None:
     assert_same(usm_gym.evaluate(policy(), mixed(), workers=2), scored())
 
 
+@pytest.mark.parametrize("id", ["sta", "pd"])
+def test_in_space_neither_workers_nor_company_nor_order_matter(id: str) -> None:
+    scenarios = [
+        replace(scenario, duration=2.0, settle_time=0.5) for scenario in usm_gym.suite("torpedo3d")
+    ][:10]
+    law: Any = usm_baselines.make(id, scenarios[0].nominal)
+    whole = usm_gym.evaluate(law, scenarios)  # two blocks
+    assert not whole.failed.any()
+    parts = [usm_gym.evaluate(law, scenarios[:1]), usm_gym.evaluate(law, scenarios[:0:-1])]
+    order = [0, *range(9, 0, -1)]
+    others = [joined(parts)]
+    if id == "sta":
+        others.append(usm_gym.evaluate(law, [scenarios[k] for k in order], workers=2))
+    for other in others:
+        for name, values in whole.per_episode.items():
+            np.testing.assert_array_equal(values[order], other.per_episode[name], name)
+    assert {"max_error_z", "pitch_error", "yaw_error", "roll"} <= set(whole.per_episode)
+
+
+def test_in_space_the_scores_are_those_of_the_environment_stepped_by_hand() -> None:
+    (scenario,) = usm_gym.suite("operation3d")[:1]
+    scenario = replace(scenario, duration=4.0, settle_time=1.0)
+    env = gym.make("USM-Operation3D-v0")
+    observation, info = env.reset(options={"scenario": scenario})
+    law: Any = usm_baselines.make("pid", env)
+    state, largest, over = None, np.zeros(3), False
+    while not over:
+        action, state = law.predict(observation, state)
+        observation, *_, over, info = env.step(action)
+        if env.unwrapped.simulation.count[0] >= 50:
+            angles = [abs(info[f"{angle}_error"]) for angle in ("pitch", "yaw", "roll")]
+            largest = np.maximum(largest, angles)
+    scores = usm_gym.evaluate(law, [scenario]).per_episode
+    for axis in "xyz":
+        assert scores[f"max_error_{axis}"][0] == info[f"max_error_{axis}"]
+    assert [scores[name][0] for name in ("pitch_error", "yaw_error", "roll")] == largest.tolist()
+
+
 def test_the_order_of_scenarios_does_not_matter() -> None:
     order = [3, 0, 5, 4, 1, 2]
     turned = usm_gym.evaluate(policy(), [mixed()[k] for k in order])

@@ -2,17 +2,37 @@
 
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from support.spatial_swimming import ROBOTS
 from support.strategies import ANYTHING, NUMBERS, almost_fields, fields_in_range
 
 import usm_gym
-from usm_gym import Conditions, Inspection, Path, Robot, Scenario, Thruster, Water, Wave
+from usm_gym import (
+    Conditions,
+    Inspection,
+    Link,
+    Path,
+    Robot,
+    Scan,
+    Scenario,
+    SpatialPath,
+    SpatialRobot,
+    SpatialScenario,
+    SpatialThruster,
+    SpatialWater,
+    SpatialWave,
+    Thruster,
+    Water,
+    Wave,
+)
 from usm_gym.envs.usm import USMEnv, USMVectorEnv
-from usm_gym.robots import robot_of
+from usm_gym.envs.usm3d import USM3DEnv, USM3DVectorEnv
+from usm_gym.robots import robot_of, spatial_robot_of
 from usm_gym.support.validation import QUOTED, SAID
 from usm_gym.task.conditions import conditions_of
 from usm_gym.task.scenario import MODES
@@ -21,13 +41,19 @@ from usm_gym.task.scenario import MODES
 AFFORDABLE = 300_000
 ROBOT = Robot()
 NOMINAL = Scenario().nominal
-CLASSES = [Robot, Thruster, Conditions, Path, Inspection, Water, Wave, Scenario]
+CLASSES = [
+    *(Robot, Thruster, Conditions, Path, Inspection, Water, Wave, Scenario),
+    *(SpatialRobot, Link, SpatialThruster, SpatialPath, Scan, SpatialWater, SpatialWave),
+    SpatialScenario,
+]
+both = pytest.mark.parametrize("cls", [Scenario, SpatialScenario])
 
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """Compile the kernels, which takes longer than an example may."""
-    for world in (USMEnv("operation"), USMVectorEnv(3, "operation")):
+    spatial = USM3DEnv("operation3d"), USM3DVectorEnv(3, "operation3d")
+    for world in (USMEnv("operation"), USMVectorEnv(3, "operation"), *spatial):
         world.reset(seed=0)
         world.step(np.zeros(world.action_space.shape))
     usm_gym.linearise(NOMINAL)
@@ -59,52 +85,90 @@ def test_conditions_of_refuses_or_makes_conditions(value):
     assert no or isinstance(conditions, Conditions)
 
 
-@given(value=st.one_of(ANYTHING, almost_fields(Robot), fields_in_range(Robot)))
-def test_robot_of_refuses_or_makes_a_robot(value):
-    no, robot = refused(robot_of, value)
-    assert no or isinstance(robot, Robot)
+@pytest.mark.parametrize(("cls", "made"), [(Robot, robot_of), (SpatialRobot, spatial_robot_of)])
+@given(data=st.data())
+def test_robot_of_refuses_or_makes_a_robot(cls, made, data):
+    value = data.draw(st.one_of(ANYTHING, almost_fields(cls), fields_in_range(cls)))
+    no, robot = refused(made, value)
+    assert no or isinstance(robot, cls)
 
 
-@given(value=st.one_of(ANYTHING, almost_fields(Scenario), fields_in_range(Scenario)))
-def test_from_dict_refuses_or_makes_what_json_gives_back(value):
-    no, scenario = refused(Scenario.from_dict, value)
+@both
+@given(data=st.data())
+def test_from_dict_refuses_or_makes_what_json_gives_back(cls, data):
+    value = data.draw(st.one_of(ANYTHING, almost_fields(cls), fields_in_range(cls)))
+    no, scenario = refused(cls.from_dict, value)
     if not no:
-        assert Scenario.from_dict(json.loads(json.dumps(scenario.to_dict()))) == scenario
+        assert cls.from_dict(json.loads(json.dumps(scenario.to_dict()))) == scenario
 
 
 def affordable(robot, scenario, periods):
     steps = min(periods, scenario.steps) * scenario.conditions.substeps
-    return steps * robot.links <= AFFORDABLE and scenario.steps <= 100_000
+    links = robot.links if isinstance(robot, Robot) else len(robot.links)
+    return steps * links <= AFFORDABLE and scenario.steps <= 100_000
 
 
-@st.composite
-def swims(draw):
-    """A robot, a scenario for it and forces, all within their ranges."""
-    no, robot = refused(robot_of, draw(fields_in_range(Robot)))
-    assume(not no)
-    fields = draw(fields_in_range(Scenario))
+def spatial_bodies():
+    """Robots in space: the shape of one that there is, all other numbers within their ranges."""
+    fixed = ("links", "joint_axes", "thrusters")
+    numbers = fields_in_range(SpatialRobot).map(
+        lambda fields: {name: fields[name] for name in fields if name not in fixed}
+    )
+    shapes = st.sampled_from(list(ROBOTS.values()))
+    mass = st.sampled_from([None, 1e-3, 1.0, 1e5])
+    return st.builds(
+        lambda shape, numbers, mass: replace(
+            shape, links=tuple(replace(link, mass=mass) for link in shape.links), **numbers
+        ),
+        shapes,
+        numbers,
+        mass,
+    )
+
+
+def brief(draw, fields):
+    """Let an episode be short, of whole control periods."""
     substeps = draw(st.integers(1, 40))
     conditions = fields.setdefault("conditions", {})
     step = conditions.setdefault("physics_step", 1e-3)
     conditions["control_period"] = step * substeps
     fields["duration"] = step * substeps * draw(st.integers(1, 60))
-    fields.setdefault("inspection", {})["bending_joints"] = draw(st.integers(1, robot.links - 1))
     soon = st.floats(0.0, fields["duration"])
-    times = sorted(draw(st.lists(soon, max_size=4, unique=True)))
-    fields["inspection"]["times"] = times
-    deflection = st.floats(-100, 100)
-    fields["inspection"]["deflections"] = [draw(deflection) for _ in times]
-    no, scenario = refused(Scenario.from_dict, fields)
+    return sorted(draw(st.lists(soon, max_size=4, unique=True)))
+
+
+@st.composite
+def swims(draw, cls):
+    """A robot, a scenario for it and forces, all within their ranges."""
+    fields, angle = draw(fields_in_range(cls)), st.floats(-100, 100)
+    times = brief(draw, fields)
+    if cls is Scenario:
+        no, robot = refused(robot_of, draw(fields_in_range(Robot)))
+        assume(not no)
+        motion, names, joints = "inspection", ["deflections"], robot.links - 1
+    else:
+        robot = draw(spatial_bodies())
+        motion, names, joints = "scan", ["pans", "tilts"], len(robot.joint_axes)
+        fields["robot"] = robot
+        fields["thruster_gains"] = ()
+        fields.setdefault("water", {})["link_factors"] = ()
+    moving = fields.setdefault(motion, {})
+    moving["bending_joints"] = draw(st.integers(1, joints))
+    moving["times"] = times
+    for name in names:
+        moving[name] = [draw(angle) for _ in times]
+    no, scenario = refused(cls.from_dict, fields)
     assume(not no)
     forces = draw(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=8))
     return robot, scenario, forces
 
 
-@given(swim=swims())
-def test_whatever_is_in_range_swims_or_is_lost_with_finite_observations(swim):
-    robot, scenario, forces = swim
+@pytest.mark.parametrize(("cls", "made"), [(Scenario, USMEnv), (SpatialScenario, USM3DEnv)])
+@given(data=st.data())
+def test_whatever_is_in_range_swims_or_is_lost_with_finite_observations(cls, made, data):
+    robot, scenario, forces = data.draw(swims(cls))
     assume(affordable(robot, scenario, 60))
-    env = USMEnv(scenario.mode, scenario.conditions, robot)
+    env = made(scenario.mode, scenario.conditions, robot)
     no, started = refused(env.reset, options={"scenario": scenario})
     if no:
         return

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 
 import usm_gym
-from usm_gym import Scenario, Water, Wave
+from usm_gym import SpatialWater, Water, Wave
 from usm_gym.simulation import Simulation
 from usm_gym.task.conditions import PRESETS
+from usm_gym.task.modes import AnyScenario, presets_of
 from usm_gym.task.nominal import Nominal
 
-ID = "USM-Operation-v0"
+KINDS = [
+    ("USM-Operation-v0", "operation-basin"),
+    ("USM-Operation-v0", "operation-sea"),
+    ("USM-Operation3D-v0", "operation3d-basin"),
+    ("USM-Operation3D-v0", "operation3d-sea"),
+]
 # What a controller may know beforehand, all of it the same for every episode of the conditions.
 KNOWN = {
     *("robot", "control_period", "thruster_time_constant", "thruster_dead_band", "action_delay"),
@@ -23,7 +29,7 @@ KNOWN = {
 }
 
 
-def secrets(scenario: Scenario) -> set[float]:
+def secrets(scenario: AnyScenario) -> set[float]:
     """Every number that was drawn for an episode's water and thrusters."""
 
     def numbers(value: Any) -> list[float]:
@@ -45,11 +51,11 @@ def leaves(value: Any) -> list[float]:
     return [float(value)] if isinstance(value, (int, float)) else []
 
 
-@pytest.mark.parametrize("preset", ["basin", "sea"])
-def test_nominal_knowledge_is_that_of_the_conditions_and_no_more(preset: str) -> None:
+@pytest.mark.parametrize("suite", [suite for _, suite in KINDS])
+def test_nominal_knowledge_is_that_of_the_conditions_and_no_more(suite: str) -> None:
     assert {field.name for field in fields(Nominal)} == KNOWN
-    conditions = PRESETS[preset]
-    episodes = usm_gym.suite(f"operation-{preset}")
+    episodes = usm_gym.suite(suite)
+    conditions = presets_of(episodes[0].mode)[suite.partition("-")[2]]
     (nominal,) = {scenario.nominal for scenario in episodes}
     for name in KNOWN - {"robot"}:
         assert getattr(nominal, name) == getattr(conditions, name)
@@ -62,8 +68,9 @@ def test_nominal_knowledge_is_that_of_the_conditions_and_no_more(preset: str) ->
 @pytest.mark.parametrize(
     "name", ["water", "thruster_gains", "coefficients", "noise_seed", "current"]
 )
-def test_nominal_knowledge_leads_nowhere_else(name: str) -> None:
-    nominal = usm_gym.suite("operation-sea")[0].nominal
+@pytest.mark.parametrize("suite", ["operation-sea", "operation3d-sea"])
+def test_nominal_knowledge_leads_nowhere_else(suite: str, name: str) -> None:
+    nominal = usm_gym.suite(suite)[0].nominal
     for holder in (nominal, nominal.robot):
         with pytest.raises(AttributeError):
             getattr(holder, name)
@@ -88,25 +95,37 @@ def test_whatever_is_drawn_nominal_knowledge_is_the_same() -> None:
     assert repr(other.nominal) == repr(plain.nominal)
 
 
-@pytest.mark.parametrize("preset", ["basin", "sea"])
-def test_infos_of_reset_and_step_hold_no_secret(preset: str) -> None:
-    env = gym.make(ID, conditions=preset)
+@pytest.mark.parametrize(("id", "suite"), KINDS)
+def test_infos_of_reset_and_step_hold_no_secret(id: str, suite: str) -> None:
+    env = gym.make(id, conditions=suite.partition("-")[2])
     _, info = env.reset(seed=0)
     told = [info]
     for _ in range(50):
-        *_, info = env.step(np.full(5, 0.1, np.float32))
+        *_, info = env.step(np.full(env.action_space.shape, 0.1, np.float32))  # type: ignore[arg-type]
         told.append(info)
-    keys = {"error_x", "error_y", "max_error_x", "max_error_y", "heading_error", "thrust_effort"}
+    axes = env.unwrapped.world.axes  # type: ignore[attr-defined]
+    angles = ("heading",) if len(axes) == 2 else ("pitch", "yaw", "roll")
+    keys = {f"{kind}_{axis}" for kind in ("error", "max_error") for axis in axes}
+    keys |= {f"{angle}_error" for angle in angles} | {"thrust_effort"}
     scenario = env.unwrapped.scenario  # type: ignore[attr-defined]
     for each in told:
         assert set(each) == keys | {"diverged"}
         assert not set(leaves(each)) & (secrets(scenario) - {0.0})
 
 
-def test_observations_are_the_same_whatever_cannot_be_measured() -> None:
+@pytest.mark.parametrize(
+    ("suite", "water", "gains"),
+    [
+        ("operation-sea", Water(link_factors=(0.5,) * 16), (0.5,) * 5),
+        ("operation3d-sea", SpatialWater(link_factors=(0.5,) * 9), (0.5,) * 7),
+    ],
+)
+def test_observations_are_the_same_whatever_cannot_be_measured(
+    suite: str, water: Any, gains: tuple[float, ...]
+) -> None:
     # At rest at the start, with the same sensors, nothing tells one water or thruster from another.
-    plain = usm_gym.suite("operation-sea")[0]
-    other = replace(plain, water=Water(link_factors=(0.5,) * 16), thruster_gains=(0.5,) * 5)
+    plain = usm_gym.suite(suite)[0]
+    other = replace(plain, water=water, thruster_gains=gains)
     np.testing.assert_array_equal(*Simulation([plain, other]).observation)
 
 

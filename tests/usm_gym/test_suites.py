@@ -7,28 +7,38 @@ from typing import Any
 import pytest
 
 from usm_gym import suite
+from usm_gym.robots import EELY, PAPER, name_of
 from usm_gym.suites import NAMES
 from usm_gym.suites import __main__ as writer
 from usm_gym.support.seeding import EVALUATION, TRAINING, TUNING, VALIDATION, stream
 from usm_gym.task.conditions import PRESETS
+from usm_gym.task.modes import presets_of
 from usm_gym.task.sampling import named, sample
 
 
 @pytest.mark.parametrize(
-    ("name", "count", "mode", "preset"),
+    ("name", "count", "mode", "preset", "robot"),
     [
-        ("operation", 50, "operation", "field"),
-        ("operation-ideal", 20, "operation", "ideal"),
-        ("operation-basin", 50, "operation", "basin"),
-        ("operation-sea", 50, "operation", "sea"),
-        ("torpedo", 50, "torpedo", "field"),
-        ("torpedo-sea", 50, "torpedo", "sea"),
+        ("operation", 50, "operation", "field", PAPER),
+        ("operation-ideal", 20, "operation", "ideal", PAPER),
+        ("operation-basin", 50, "operation", "basin", PAPER),
+        ("operation-sea", 50, "operation", "sea", PAPER),
+        ("torpedo", 50, "torpedo", "field", PAPER),
+        ("torpedo-sea", 50, "torpedo", "sea", PAPER),
+        ("operation3d", 50, "operation3d", "field", EELY),
+        ("operation3d-basin", 50, "operation3d", "basin", EELY),
+        ("operation3d-sea", 50, "operation3d", "sea", EELY),
+        ("operation3d-neutral", 50, "operation3d", "field", "eely-neutral"),
+        ("torpedo3d", 50, "torpedo3d", "field", EELY),
     ],
 )
-def test_suites_are_as_documented(name: str, count: int, mode: str, preset: str) -> None:
+def test_suites_are_as_documented(
+    name: str, count: int, mode: str, preset: str, robot: str
+) -> None:
     scenarios = suite(name)
     assert len(scenarios) == len(set(scenarios)) == count
-    assert {(s.mode, s.conditions) for s in scenarios} == {(mode, PRESETS[preset])}
+    found = {(s.mode, s.conditions, name_of(s.body)) for s in scenarios}
+    assert found == {(mode, presets_of(mode)[preset], robot)}
 
 
 def test_the_suite_of_table_1_is_its_two_scenarios() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Strict, TypeAdapter
+from pydantic import BeforeValidator, Field, Strict, TypeAdapter
 
 from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robots import EELY, name_of, spatial_robot_of
@@ -36,6 +36,15 @@ Amplitude = Annotated[Number, Field(ge=-100, le=100)]
 Angle = Annotated[Number, Field(ge=-100, le=100)]
 Angles = tuple[Angle, ...]
 Times = Annotated[tuple[Time, ...], Field(max_length=MAX_SHIFTS)]
+
+
+def _on_field(value: Any) -> Any:
+    """Fields of conditions on top of those of the preset "field" in space."""
+    fields = dataclasses.asdict(SPATIAL_PRESETS["field"])
+    return fields | value if isinstance(value, dict) else value
+
+
+SpatialConditions = Annotated[Conditions, BeforeValidator(_on_field)]
 
 
 @validated
@@ -72,7 +81,7 @@ class Scan:
         bending_joints: How many joints bend, counted from the head, 1 to 63.
         times: When pan and tilt change, up to 16 rising times, 0 to 3600 s.
         pans: To what the pan changes at those times, -100 to 100 rad.
-        tilts: The same of the tilt.
+        tilts: The same of the tilt, -100 to 100 rad.
         filter_frequency: Natural frequency of the critically damped second-order filter between
             those steps and the joint references, 0.01 to 1000 rad/s; None leaves them steps.
     """
@@ -129,7 +138,7 @@ class SpatialScenario:
     mode: SpatialMode = "operation3d"
     path: SpatialPath = SpatialPath()
     scan: Scan = Scan()
-    conditions: Conditions = SPATIAL_PRESETS["field"]
+    conditions: SpatialConditions = SPATIAL_PRESETS["field"]
     water: SpatialWater = SpatialWater()
     thruster_gains: tuple[Coefficient, ...] = ()
     duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from usm_gym import Conditions
-from usm_gym.task.conditions import PRESETS, conditions_of
+from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS, conditions_of, preset_of
 
 
 def test_presets_are_those_of_the_documentation() -> None:
@@ -49,6 +49,32 @@ def test_presets_are_those_of_the_documentation() -> None:
         assert dataclasses.asdict(preset) == expected
         assert conditions_of(name) == preset
     assert Conditions() == PRESETS["field"]
+
+
+def test_presets_in_space_are_those_of_the_plane_but_for_the_robot() -> None:
+    other: dict[str, dict[str, Any]] = {
+        "ideal": {"thruster_limit": 200.0, "filter_range": (3.0, 5.0)},
+        "field": {
+            "thruster_time_constant": 0.1,
+            "thruster_limit": 40.0,
+            "tail_angle_noise": 2e-4,
+            "rate_noise": 2e-4,
+            "filter_range": (3.0, 5.0),
+        },
+        "basin": {"thruster_time_constant": 0.2, "thruster_limit": 30.0},
+        "sea": {"thruster_time_constant": 0.25, "thruster_limit": 40.0},
+    }
+    scans = {"thruster_dead_band": 0.5, "filter_range": (2.5, 4.0), "shift_gap_range": (5.0, 8.0)}
+    assert list(SPATIAL_PRESETS) == list(PRESETS)
+    for name, preset in SPATIAL_PRESETS.items():
+        changed = {"deflection_range": (0.4, 1.0)} | other[name]
+        changed |= scans if name in ("basin", "sea") else {}
+        assert preset == dataclasses.replace(PRESETS[name], **changed)
+        assert conditions_of(name, SPATIAL_PRESETS) == preset
+        assert (preset_of(PRESETS[name]), preset_of(preset)) == (name, f"{name}3d")
+    assert preset_of(dataclasses.replace(preset, wave_limit=0.3)) == ""
+    faster = conditions_of({"action_delay": 2}, SPATIAL_PRESETS)
+    assert faster == dataclasses.replace(SPATIAL_PRESETS["field"], action_delay=2)
 
 
 def test_conditions_may_be_fields_on_top_of_field() -> None:

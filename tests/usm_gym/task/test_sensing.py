@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.episodes import seen_by
+from support.space import mass_motion, state_of
 
 from usm_gym import Conditions, Robot, Scenario
 from usm_gym.simulation import Simulation
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.task.conditions import PRESETS
+from usm_gym.task.modes import sample_of
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.sensing import ANGLES, MISSING, POSITION, VELOCITY, Sensing, known
 from usm_gym.task.water import WATER
@@ -22,8 +24,17 @@ FIELD, BASIN, SEA = (PRESETS[name] for name in ("field", "basin", "sea"))
 LATE = Conditions(position_period=4, position_delay=6, velocity_period=3, velocity_delay=1)
 
 
-def drawn(conditions: Conditions, seed: int = 0) -> Scenario:
-    return sample("operation", conditions, stream(seed, EVALUATION, 0))
+def drawn(conditions: Conditions, seed: int = 0, mode: Any = "operation") -> Any:
+    return sample_of(mode, conditions, stream(seed, EVALUATION, 0))
+
+
+def velocity_of(simulation: Simulation) -> Array:
+    """Return the velocities of the centres of mass, m/s, (robots, axes)."""
+    if len(simulation.world.axes) == 2:
+        return simulation.read("velocity")
+    bodies = [scenario.body for scenario in simulation.scenarios]
+    moving = [mass_motion(body, state_of(simulation, k))[1] for k, body in enumerate(bodies)]
+    return np.array(moving)
 
 
 def arrivals(period: int, delay: int, missing: list[bool]) -> list[int]:
@@ -48,21 +59,25 @@ def test_what_is_known_is_the_newest_that_has_arrived(
     assert known(period, delay, missing).tolist() == arrivals(period, delay, missing.tolist())
 
 
-@pytest.mark.parametrize("robots", [1, 3])
+@pytest.mark.parametrize(
+    ("mode", "robots"), [("operation", 1), ("operation", 3), ("operation3d", 3)]
+)
 @pytest.mark.parametrize("conditions", [FIELD, LATE, BASIN, SEA], ids=["field", "late", "b", "s"])
 def test_what_is_observed_was_true_when_it_was_measured(
-    conditions: Conditions, robots: int
+    mode: str, conditions: Conditions, robots: int
 ) -> None:
-    scenarios = [drawn(conditions, k) for k in range(robots)]
+    scenarios = [drawn(conditions, k, mode) for k in range(robots)]
     simulation = Simulation(scenarios)
     rng = np.random.default_rng(0)
-    errors, velocities = [simulation.error.copy()], [simulation.read("velocity")]
+    errors, velocities = [simulation.error.copy()], [velocity_of(simulation)]
+    axes, given = len(simulation.world.axes), (robots, simulation.world.thrusters)
     measured = [scenario.sensing() for scenario in scenarios]
     ages: set[float] = set()
     for k in range(1, 250):
-        simulation.step(rng.uniform(-0.3, 0.3, (robots, 5)).astype(np.float32))
+        simulation.step(rng.uniform(-0.3, 0.3, given).astype(np.float32))
         errors.append(simulation.error.copy())
-        velocities.append(simulation.read("velocity"))
+        if conditions.velocity_period is not None:
+            velocities.append(velocity_of(simulation))
         for robot, each in enumerate(measured):
             seen = seen_by(simulation, robot)
             at, velocity_at = each.taken[k].tolist()
@@ -71,10 +86,10 @@ def test_what_is_observed_was_true_when_it_was_measured(
             assert seen["position_age"] == pytest.approx((k - at) * 0.02, rel=1e-6)
             ages.add(k - at)
             if conditions.velocity_period is None:
-                assert seen["velocity"].tolist() == [0.0, 0.0]
+                assert seen["velocity"].tolist() == [0.0] * axes
                 assert seen["velocity_age"] == -1.0
             else:
-                expected = velocities[velocity_at][robot] + each.others[velocity_at, :2]
+                expected = velocities[velocity_at][robot] + each.others[velocity_at, :axes]
                 np.testing.assert_allclose(seen["velocity"], expected, rtol=1e-6, atol=1e-8)
                 assert seen["velocity_age"] == pytest.approx((k - velocity_at) * 0.02, rel=1e-6)
     assert len(ages) >= conditions.position_period

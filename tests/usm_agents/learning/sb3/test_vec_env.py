@@ -18,9 +18,9 @@ ID = "USM-Operation-v0"
 HARD = {"thruster_limit": 3.0, "current_limit": 0.3}
 
 
-def vec_env(count, reward=None, **arguments):
+def vec_env(count, reward=None, id=ID, **arguments):
     envs = gym.make_vec(
-        ID,
+        id,
         num_envs=count,
         vectorization_mode="vector_entry_point",
         autoreset_mode="SameStep",
@@ -29,15 +29,17 @@ def vec_env(count, reward=None, **arguments):
     return SB3VecEnv(envs, **(reward or {}))
 
 
-def test_it_behaves_as_sb3s_own_over_monitored_environments():
-    envs = vec_env(3, conditions=HARD)
-    reference = DummyVecEnv([lambda: Monitor(gym.make(ID, conditions=HARD))] * 3)
+@pytest.mark.parametrize("id", [ID, "USM-Operation3D-v0"])
+def test_it_behaves_as_sb3s_own_over_monitored_environments(id):
+    envs = vec_env(3, id=id, conditions=HARD)
+    reference = DummyVecEnv([lambda: Monitor(gym.make(id, conditions=HARD))] * 3)
     for each in (envs, reference):
         each.seed(5)
     assert (envs.reset() == reference.reset()).all()
     assert envs.reset_infos == reference.reset_infos
     ends = 0
-    for action in np.random.default_rng(0).uniform(-1, 1, (900, 3, 5)).astype(np.float32):
+    shape = 900, 3, *envs.action_space.shape
+    for action in np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32):
         ours, theirs = envs.step(action), reference.step(action)
         for a, b in zip(ours[:3], theirs[:3], strict=True):
             assert (a == b).all()
