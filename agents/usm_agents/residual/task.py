@@ -230,7 +230,7 @@ class Residual:
         Returns:
             Thruster commands over the limit, (batch, thrusters), and what to keep.
         """
-        action = action.clip(-1.0, 1.0)
+        action = np.minimum(np.maximum(action, -1.0), 1.0)
         if self._corrected is not None:
             assert memory.known is not None
             command, base_state = self._corrected.decide(memory.known, self._correction(action))
