@@ -14,12 +14,12 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from usm_agents.residual.env import ResidualVectorEnv
-from usm_gym.envs.usm import USMVectorEnv
+from usm_gym.envs.vector_env import TrackingVectorEnv
 from usm_gym.support.validation import require
 
 
 class SB3VecEnv(VecEnv):
-    """The robots of a `USMVectorEnv`, or of the residual task on one, as Stable-Baselines3 wants.
+    """The robots of a vector environment, or of the residual task on one, for Stable-Baselines3.
 
     Episodes restart within the step that ends them. The info of a step that ends an episode has
     everything: the environment's own keys, `terminal_observation`, `TimeLimit.truncated`, and
@@ -47,12 +47,13 @@ class SB3VecEnv(VecEnv):
         """
         plain = envs.unwrapped
         require(
-            isinstance(plain, USMVectorEnv) and isinstance(envs, (USMVectorEnv, ResidualVectorEnv)),
+            isinstance(plain, TrackingVectorEnv)
+            and isinstance(envs, (TrackingVectorEnv, ResidualVectorEnv)),
             "envs",
             envs,
-            "a USMVectorEnv, or a ResidualVectorEnv around one",
+            "a USMVectorEnv or USM3DVectorEnv, or a ResidualVectorEnv",
         )
-        assert isinstance(plain, USMVectorEnv)
+        assert isinstance(plain, TrackingVectorEnv)
         require(
             plain.autoreset_mode is AutoresetMode.SAME_STEP,
             "autoreset_mode",
