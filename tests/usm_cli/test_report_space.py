@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
-from support.browser import drawn, faults, find, show
+from support.browser import complaints, drawn, faults, find, show
 
 from usm_cli.report import chapters, page
 from usm_cli.report.blocks import Chapter, Facts, Replay
@@ -209,7 +209,7 @@ def test_keys_and_buttons_move_the_camera(browser, path):
     find(browser, ".side-seen").send_keys("above")
     back, _ = np.array(camera(browser)) - camera(browser)[1]
     assert back[2] > 0.99 * np.linalg.norm(back)
-    assert browser.get_log("browser") == []
+    assert complaints(browser) == []
 
 
 @pytest.mark.slow
@@ -247,7 +247,7 @@ def test_mouse_and_fingers_move_the_camera(browser, path):
     browser.execute_script("document.querySelector('.water').focus({ preventScroll: true })")
     browser.execute_script(roll)
     assert np.linalg.norm(np.subtract(*camera(browser))) < length / 2
-    assert browser.get_log("browser") == []
+    assert complaints(browser) == []
 
 
 @pytest.mark.slow
@@ -270,7 +270,7 @@ def test_without_webgl_the_robot_is_drawn_as_lines(browser, path):
             "count += data[i] - data[i + 2] > 100 && data[i + 3] === 255; return count"
         )
         assert browser.execute_script(script) > 100  # the head's orange
-        assert browser.get_log("browser") == []
+        assert complaints(browser) == []
     finally:
         browser.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", made)
 

@@ -53,8 +53,10 @@ class Replay {
     this.b = this.episode(this.find(".pick-b").value);
     this.shown = [this.a, this.b].filter(Boolean);
     const late = (_, k) => this.sampleTime(k) >= this.data.settle;
-    const largest = Math.max(...this.shown.flatMap(({ error }) =>
-      error.filter(late).map((parts) => Math.hypot(...parts))), 1e-7);
+    const scored = this.shown.flatMap(({ error }) => error.filter(late));
+    // All may be lost before anything is scored.
+    const seen = scored.length ? scored : this.shown.flatMap(({ error }) => error);
+    const largest = seen.reduce((most, parts) => Math.max(most, Math.hypot(...parts)), 1e-7);
     this.scale = roundScale(largest);
     this.fillCharts();
     this.goTo(this.time);
