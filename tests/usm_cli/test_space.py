@@ -92,7 +92,6 @@ def test_a_file_of_scenarios_may_be_of_another_robot(tmp_path, result):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--suite", "operation3d", "--policies", "lqg"), "robot is SpatialRobot("),
         (("--suite", "operation3d", "--policies", "residual-ppo"), "robot is SpatialRobot("),
         (("--suite", "operation3D"), "suite is 'operation3D'; allowed: operation,"),
         (("--mode", "diving3d"), "invalid choice: 'diving3d'"),

@@ -54,10 +54,9 @@ def shared(function: F) -> F:
 
 def _part(function: F, **options: Any) -> F:
     notice(function)
-    # Only kernels call it, so it needs no entry for anybody else; these take long to compile.
-    alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    usual = {"fastmath": FLAGS, "error_model": "numpy"}
-    part: F = numba.njit(**usual | alone | options)(function)
+    # No C code calls it, and an entry for that takes long to compile.
+    usual = {"fastmath": FLAGS, "error_model": "numpy", "no_cfunc_wrapper": True}
+    part: F = numba.njit(**usual | options)(function)
     return part
 
 

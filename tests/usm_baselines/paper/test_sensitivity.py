@@ -92,7 +92,7 @@ def test_a_file_that_is_no_study_is_refused(tmp_path):
 
 @numba.njit
 def forces(T, moment, found):
-    thrusters.allocate(T, np.array([3.0, -2.0, moment]), 3, np.empty((7, 3)), found)
+    thrusters.allocate(T, np.array([3.0, -2.0, moment]), 3, 0.0, np.empty((7, 3)), found)
 
 
 def test_the_printed_moment_row_is_a_smaller_heading_gain():
