@@ -31,7 +31,7 @@ class USM3DEnv(TrackingEnv):
     path and the body level and straight ahead, while the head looks to the side and up, elsewhere,
     and back, at about 10, 20 and 30 s, and so disturbs both. In torpedo mode
     (`usm_gym:USM-Torpedo3D-v0`) the body is straight, the path faster, and pitch and yaw follow the
-    line of sight. Roll is reported; nothing but the keel holds it. The score of an episode is the
+    line of sight. Roll is reported, and no reference is set for it. The score of an episode is the
     largest true position error per axis after settling.
 
     ## Action
