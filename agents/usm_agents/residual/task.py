@@ -21,7 +21,6 @@ from usm_agents.residual.observer import ResidualObserver
 from usm_gym.kernels.compile import compiled
 from usm_gym.plant.thrusters import allocate
 from usm_gym.policy import Policy
-from usm_gym.robot import Robot
 from usm_gym.support.validation import Count, Number, is_whole, require
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
@@ -124,11 +123,9 @@ class Residual:
                 the agent, m; by default that of the nominal knowledge.
 
         Raises:
-            ValueError: If the robot is not planar, the base unknown or an argument not allowed.
+            ValueError: If the base is unknown or an argument not allowed.
         """
         _check(residual_scale, action, frames)
-        planar = isinstance(nominal.robot, Robot)
-        require(planar, "robot", nominal.robot, "the planar robot")
         self.nominal = nominal
         self.base = base = _made(base, nominal)
         self._scale, self._action = float(residual_scale), action
