@@ -274,9 +274,9 @@ class PlanarWorld(World):
         """True parameters and signals, in the global frame.
 
         Returns:
-            `coefficients`, as in `Robot.hydrodynamic_coefficients`, (size, 6); `water_velocity` and
-            `velocity` of the centre of mass, m/s, (size, 2); `disturbance`, its acceleration less
-            that by the thrusters over the mass, f / m_t of (23), m/s^2, (size, 2).
+            `coefficients`, as in `Robot.hydrodynamic_coefficients`, (size, 6); `water_velocity`,
+            m/s, (size, 2); `disturbance`, the acceleration of the centre of mass less that by the
+            thrusters over the mass, f / m_t of (23), m/s^2, (size, 2).
         """
         along, across = read("push_along"), read("push_across")
         s, c = read("sine"), read("cosine")
@@ -286,7 +286,6 @@ class PlanarWorld(World):
         return {
             "coefficients": read("coefficients"),
             "water_velocity": read("water_velocity"),
-            "velocity": read("velocity"),
             "disturbance": read("acceleration") - push.T / self.mass,
         }
 

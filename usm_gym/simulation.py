@@ -118,6 +118,12 @@ class Simulation:
         rows = self._rows[:, self.world.quantities[quantity]]
         return rows.swapaxes(1, 2).reshape(-1, rows.shape[1])[: self.size].copy()
 
+    @property
+    def velocity(self) -> Array:
+        """True velocities of what has to follow the path, m/s, (size, axes)."""
+        now = self._past[np.arange(self.size), self.count % self._past.shape[1]]
+        return now[:, len(self.world.axes) :]
+
     def check(self, scenario: Any) -> None:
         """Refuse a scenario that `start` would refuse.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import ClassVar
@@ -343,6 +343,15 @@ class SpatialWorld(World):
             shifts=shifts,
             sinusoids=sinusoids,
         )
+
+    def truth(self, read: Callable[[str], Array]) -> dict[str, Array]:
+        """True parameters and signals, in the global frame.
+
+        Returns:
+            `coefficients`, as in `SpatialRobot.hydrodynamic_coefficients`, (size, 6);
+            `water_velocity`, m/s, (size, 3).
+        """
+        return {name: read(name) for name in ("coefficients", "water_velocity")}
 
     def allocate(self, observation: NDArray[np.float32], matrices: Array) -> None:
         """Fill in the allocation matrices of robots as observed; see `World.allocate`."""

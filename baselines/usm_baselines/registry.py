@@ -159,10 +159,19 @@ def tuned(file: GainsFile) -> Registration:
     )
 
 
+def law_of(id: str) -> str:
+    """The id of a policy without what its name says of its gains."""
+    forms = [suffix for suffix in FOLDERS if id.endswith(f"-{suffix}")]
+    return id.removesuffix(f"-{max(forms, key=len)}") if forms else id
+
+
 def base_of(id: str) -> str:
     """The policy of which another is a form, with other gains or estimates; itself if of none."""
-    law, _, form = id.rpartition("-")
-    return base_of(law) if form in (*FOLDERS, "lag", "navigator") and law in _entries else id
+    law = law_of(id)
+    if law == id:
+        for estimates in ("lag", "navigator"):
+            law = law.removesuffix(f"-{estimates}")
+    return base_of(law) if law != id and law in _entries else id
 
 
 def ids() -> list[str]:

@@ -33,10 +33,9 @@ from usm_agents.learning.settings import SETTINGS
 from usm_agents.study import dissection, plans, scores, trainings
 from usm_baselines import registry
 from usm_baselines.benchmark import tuning
-from usm_baselines.benchmark.leaderboard import MAIN
+from usm_baselines.benchmark.leaderboard import PLANE, Board
 from usm_baselines.space import Range
 
-from usm_cli.commands import leaderboard
 from usm_cli.program import main
 from usm_gym.suites import suite
 from usm_gym.support import provenance
@@ -87,8 +86,8 @@ def shrink():
     registry._entries["sta"] = replace(registry._entries["sta"], space=SPACE)
     tuned = tuning.sample_of
     tuning.sample_of = lambda *of: brief(tuned(*of))
-    frozen = [brief(each) for each in suite(MAIN)[:4]]
-    leaderboard.suites = lambda: {MAIN: frozen[:2], "other": frozen[2:]}
+    frozen = [brief(each) for each in suite(PLANE.main)[:4]]
+    Board.suites = lambda self: {PLANE.main: frozen[:2], "other": frozen[2:]}
     # Of pictures only the names are compared, and of provenance nothing.
     save = Figure.savefig
     Figure.savefig = lambda figure, file, **how: save(Figure(), file, **how)

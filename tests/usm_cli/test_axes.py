@@ -8,7 +8,7 @@ from support.ball import BallScenario
 from support.episodes import short
 from support.results import PROVENANCE, evaluation, scores
 from usm_baselines.benchmark import leaderboard_figures, robustness_figure
-from usm_baselines.benchmark.leaderboard import MAIN, FrontPoint, LeaderboardResult, Standing
+from usm_baselines.benchmark.leaderboard import PLANE, FrontPoint, LeaderboardResult, Standing
 from usm_baselines.benchmark.leaderboard_page import brief_table, csv_text, markdown
 from usm_baselines.benchmark.results import EvaluationResult, MiddleSummary
 from usm_baselines.benchmark.robustness import RefusedPoint, RobustnessResult, ScoredPoint
@@ -69,7 +69,7 @@ def test_a_leaderboard(axes, tmp_path):
     point = FrontPoint(means={f"max_error_{axis}": 1e-3 for axis in axes} | {"thrust_variation": 9})
     result = LeaderboardResult(
         version="9",
-        suites={MAIN: {"pd": standing(axes, 1e-3), "sta": standing(axes, 2e-3)}},
+        suites={PLANE.main: {"pd": standing(axes, 1e-3), "sta": standing(axes, 2e-3)}},
         front={"pd": (point,)},
         refused={},
         provenance=PROVENANCE,
@@ -87,7 +87,7 @@ def test_a_leaderboard(axes, tmp_path):
     assert {path.stem for path in tmp_path.glob("*.png")} == {
         "verdict",
         "profiles",
-        f"errors-{MAIN}",
+        f"errors-{PLANE.main}",
     }
 
 

@@ -13,12 +13,11 @@ from usm_baselines import registry
 from usm_baselines.benchmark import leaderboard as board
 from usm_baselines.benchmark import leaderboard_page
 
-from usm_cli.commands import leaderboard
 from usm_cli.program import main
 from usm_gym.support.files import holding
 
 ROOT = Path(__file__).parents[2]
-SUITES = {board.MAIN: short(3), "other": short(2, seed=1)}
+SUITES = {board.PLANE.main: short(3), "other": short(2, seed=1)}
 FAULTY = """
 class Raising:
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
@@ -28,7 +27,7 @@ class Raising:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(leaderboard, "suites", lambda: SUITES)
+    monkeypatch.setattr(board.Board, "suites", lambda self: SUITES)
     monkeypatch.setattr(registry, "_entries", dict(registry._entries))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "raising.py").write_text(FAULTY)
@@ -59,7 +58,7 @@ def test_the_leaderboard_is_the_same_with_one_and_two_workers(
         documents.append(read(folder / workers / "leaderboard.json"))
         documents[-1].pop("provenance")
     assert documents[0] == documents[1]
-    rows = documents[0]["suites"][board.MAIN]
+    rows = documents[0]["suites"][board.PLANE.main]
     means = [row["max_error_x"]["mean"] + row["max_error_y"]["mean"] for row in rows.values()]
     assert means == sorted(means)
     assert "beats_next" not in list(rows.values())[-1]

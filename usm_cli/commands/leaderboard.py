@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.markdown import Markdown
-from usm_baselines.benchmark.leaderboard import MAIN, front, leaderboard, places, suites
+from usm_baselines.benchmark.leaderboard import PLANE, SPACE, front, leaderboard, places
 from usm_baselines.benchmark.leaderboard_page import csv_text, markdown, table, with_table
 
 from usm_cli.options import output_folder
@@ -59,7 +59,8 @@ def add_to(subparsers: Any) -> None:
     add_policies(parser, default="all on the suites that they are meant for")
     add_scoring(parser)
     add = parser.add_argument
-    add("--output", metavar="DIR", help="folder (default: results/VERSION)")
+    add("--space", action="store_true", help="the suites in space instead of those in the plane")
+    add("--output", metavar="DIR", help="folder (default: results/VERSION, or its folder space)")
     add(
         "--insert",
         metavar="FILE",
@@ -73,19 +74,23 @@ def run(arguments: argparse.Namespace) -> None:
     page = None if arguments.insert is None else read_text(arguments.insert)
     if page is not None:
         check_writable(arguments.insert)
-    folder = output_folder(arguments.output or f"results/{version('usm-gym')}")
+    board, usual = PLANE, f"results/{version('usm-gym')}"
+    if arguments.space:
+        board, usual = SPACE, f"{usual}/space"
+    folder = output_folder(arguments.output or usual)
     from usm_baselines.benchmark.leaderboard_figures import draw_all
 
     named = arguments.policies is not None
     contenders = named_contenders(arguments.policies) if named else None
-    fronts = {} if named else front()
-    chosen = places(contenders, fronts, suites(), arguments.time_limit)
+    fronts = {} if named or arguments.space else front()
+    suites = board.suites()
+    chosen = places(contenders, fronts, suites, arguments.time_limit)
     with holding(folder):
         outcomes = scored([place.job for place in chosen], arguments, folder / "cache")
         pairs = list(zip(chosen, outcomes, strict=True))
-        acts = any(p.suite == MAIN and isinstance(outcome, Evaluation) for p, outcome in pairs)
+        acts = any(isinstance(outcome, Evaluation) for p, outcome in pairs if p.suite == board.main)
         require(acts, "--policies", arguments.policies, "at least one policy that acts")
-        origin = Provenance.here({"suites": list(NAMES)})
+        origin = Provenance.here({"suites": [name for name in NAMES if name in suites]})
         result = leaderboard(pairs, fronts, version("usm-gym"), origin)
         result.write(folder / "leaderboard.json")
         write_text(folder / "leaderboard.csv", csv_text(result))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from usm_agents.study.results import HomeResult, StudyResult
-from usm_baselines.benchmark.leaderboard import CROSSED, MAIN, LeaderboardResult, suites
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
 from usm_baselines.benchmark.results import CompetitorScores, EvaluationResult, Scores
 from usm_baselines.benchmark.robustness import RobustnessResult
 from usm_baselines.contender import Contender, contender
@@ -127,23 +127,20 @@ def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> 
 
 def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -> Chapter:
     """Every policy on every suite."""
-    scenarios = suites()
-    rows = result.main
-    episodes = len(scenarios[MAIN])
+    scenarios, main, rows = result.board.suites(), result.board.main, result.main
     tables = {
         name: score_table(rows, result.refused.get(name, {}))
         for name, rows in result.suites.items()
     }
     known = {name: scenarios[name] for name in result.suites if name in scenarios}
-    tiers = {tier: result.suites[name] for tier, name in CROSSED.items() if name in result.suites}
     return Chapter(
         title=f"Leaderboard of usm-gym {result.version}",
-        lead=f"{len(rows)} policies on {len(tables)} suites; {MAIN}, with {episodes} episodes, "
-        "is the main one.",
+        lead=f"{len(rows)} policies on {len(tables)} suites; {main}, with "
+        f"{len(scenarios[main])} episodes, is the main one.",
         blocks=[
-            *advice(tiers),
-            plots.front(tiers, result.front),
-            replay(scenarios[MAIN], rows, result.axes, choice, progress),
+            *advice(result.tiers),
+            plots.front(result.tiers, result.front),
+            replay(scenarios[main], rows, result.axes, choice, progress),
             Tables("Scores", SCORES, "suite", tables),
             Tables("Conditions", CONDITIONS, "suites", {"all": conditions_table(known)}),
             provenance(result.provenance),

@@ -205,10 +205,12 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         """True parameters and signals of all robots, for training; no policy is given them.
 
         Returns:
-            What `World.truth` returns, and `error`, the position's, m, (robots, axes).
+            What `World.truth` returns; the position's `error`, m, and `velocity`, m/s, (robots,
+            axes).
         """
-        truth = self.simulation.world.truth(self.simulation.read)
-        return truth | {"error": self.simulation.error.copy()}
+        simulation = self.simulation
+        known = {"error": simulation.error.copy(), "velocity": simulation.velocity}
+        return simulation.world.truth(simulation.read) | known
 
     def snapshot(self) -> VectorSnapshot:
         """Copy the whole state, the streams from which scenarios are drawn included."""

@@ -50,8 +50,8 @@ class TrainingSetup:
             times of their episodes from then on.
         draw: Draws a scenario of the training distribution from a stream.
         truth: Gives what no policy can observe, by name, for the robots as `envs` last returned
-            them, in SI units, (robots, numbers). On the tasks of this package: "coefficients",
-            "water_velocity", "velocity", "error" and "disturbance", see `PlanarWorld.truth`.
+            them, in SI units, (robots, numbers). On the tasks of this package: "error",
+            "velocity", and what `World.truth` gives.
         folder: The folder of the training, for logs that TensorBoard reads.
     """
 

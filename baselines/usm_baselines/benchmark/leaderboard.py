@@ -16,7 +16,8 @@ from usm_baselines.benchmark.results import (
 )
 from usm_baselines.benchmark.scoring import TIME_LIMIT, Job, Refusal
 from usm_baselines.contender import Contender, contender
-from usm_baselines.gains import FOLDERS, FRONT, read_gains
+from usm_baselines.gains import FRONT, read_gains
+from usm_baselines.registry import law_of
 from usm_baselines.tiers import PAPER, meant_for
 from usm_gym.evaluation import Evaluation
 from usm_gym.statistics import compare, interquartile_mean, interval, told_apart
@@ -28,10 +29,39 @@ from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
 from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import shared_nominal
 
-MAIN = "operation"
-STILL = "operation, joints still"
-# By tier, the suite on which gains that are tuned for it and for the others are compared.
-CROSSED = {"field": MAIN, "basin": f"{MAIN}-basin", "sea": f"{MAIN}-sea"}
+
+@dataclass(frozen=True)
+class Board:
+    """The suites whose scores stand in one leaderboard: those in the plane, or those in space.
+
+    Attributes:
+        main: The suite that counts; the others are named after it, but for those of other modes.
+    """
+
+    main: str
+
+    @property
+    def still(self) -> str:
+        """Name of the control: the main suite with the joints still."""
+        return f"{self.main}, joints still"
+
+    @property
+    def tiers(self) -> dict[str, str]:
+        """By tier, the suite on which policies for it and for the others are compared."""
+        return {"field": self.main} | {tier: f"{self.main}-{tier}" for tier in ("basin", "sea")}
+
+    def suites(self) -> dict[str, list[AnyScenario]]:
+        """The frozen suites, and the control."""
+        named = [name for name in NAMES if (IN_SPACE in name) == (IN_SPACE in self.main)]
+        chosen = {name: suite(name) for name in named}
+        chosen[self.still] = [
+            replace(scenario, conditions=replace(scenario.conditions, motion=False))
+            for scenario in chosen[self.main]
+        ]
+        return chosen
+
+
+PLANE, SPACE = Board("operation"), Board("operation3d")
 
 
 @validated
@@ -133,8 +163,10 @@ class LeaderboardResult(Result):
     provenance: Provenance
 
     def __post_init__(self) -> None:
-        """Refuse a leaderboard without its main suite, and rows that cannot be compared."""
-        require(MAIN in self.suites, "suites", list(self.suites), f"{MAIN} among them")
+        """Refuse a leaderboard without a main suite, and rows that cannot be compared."""
+        mains = [board.main for board in (PLANE, SPACE)]
+        counts = [main for main in mains if main in self.suites]
+        require(counts, "suites", list(self.suites), f"{' or '.join(mains)} among them")
         for name, rows in self.suites.items():
             require(rows, f"rows of {name}", 0, "one policy or more")
             require_alike(rows.values())
@@ -143,9 +175,20 @@ class LeaderboardResult(Result):
         require(len(axes) == 1, "axes", sorted(axes), "the same in all suites")
 
     @property
+    def board(self) -> Board:
+        """Whose suites these are."""
+        return PLANE if PLANE.main in self.suites else SPACE
+
+    @property
     def main(self) -> Mapping[str, Standing]:
         """The rows of the main suite."""
-        return self.suites[MAIN]
+        return self.suites[self.board.main]
+
+    @property
+    def tiers(self) -> dict[str, Mapping[str, Standing]]:
+        """The rows of the suites that stand for the tiers, by tier."""
+        listed = self.board.tiers.items()
+        return {tier: self.suites[name] for tier, name in listed if name in self.suites}
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -164,16 +207,6 @@ class Place:
 
     suite: str
     job: Job
-
-
-def suites() -> dict[str, list[AnyScenario]]:
-    """The frozen suites in the plane, and the control row: the main one with the joints still."""
-    chosen = {name: suite(name) for name in NAMES if IN_SPACE not in name}
-    chosen[STILL] = [
-        replace(scenario, conditions=replace(scenario.conditions, motion=False))
-        for scenario in chosen[MAIN]
-    ]
-    return chosen
 
 
 def everyone(scenarios: Sequence[AnyScenario]) -> list[Contender]:
@@ -207,7 +240,7 @@ def places(
     listed = []
     for name, scenarios in chosen.items():
         nominal = shared_nominal(scenarios)
-        besides = [policy for row in fronts.values() for policy in row] if name == MAIN else []
+        besides = [policy for row in fronts.values() for policy in row if name == PLANE.main]
         meeting = everyone(scenarios) if contenders is None else contenders
         for policy in (*meeting, *besides):
             listed.append(Place(name, Job(policy, tuple(scenarios), nominal, time_limit)))
@@ -233,7 +266,7 @@ def leaderboard(
             refused.setdefault(place.suite, {})[contender.name] = outcome.reason
         else:
             scores.setdefault(place.suite, {})[contender.name] = contender, outcome
-    main = scores.get(MAIN, {})
+    main = scores.get(PLANE.main, {})
     points = {
         id: [point(main.pop(policy.name)[1]) for policy in row if policy.name in main]
         for id, row in fronts.items()
@@ -300,29 +333,25 @@ def best_of_laws(rows: Mapping[str, Standing]) -> dict[str, Standing]:
     return kept
 
 
-def law_of(id: str) -> str:
-    """The id of a policy without what its name says of its gains."""
-    law, _, gains = id.rpartition("-")
-    return law if gains in FOLDERS else id
-
-
 def crossed(result: LeaderboardResult) -> dict[str, dict[str, str]]:
     """Laws whose gains for every tier were scored in every tier.
 
     Returns:
         By law, its policies by the tier for which they are tuned.
     """
-    if not all(suite in result.suites for suite in CROSSED.values()):
+    tiers = result.board.tiers
+    if not all(suite in result.suites for suite in tiers.values()):
         return {}
     laws: dict[str, dict[str, str]] = {}
     for id, row in result.main.items():
-        if row.tuned_for in CROSSED and id != law_of(id):
-            laws.setdefault(law_of(id), {})[row.tuned_for] = id
-    rows = [result.suites[suite] for suite in CROSSED.values()]
+        tier = (row.tuned_for or "").removesuffix(IN_SPACE)
+        if tier in tiers and id != law_of(id):
+            laws.setdefault(law_of(id), {})[tier] = id
+    rows = result.tiers.values()
     return {
-        law: {tier: tuned[tier] for tier in CROSSED}
+        law: {tier: tuned[tier] for tier in tiers}
         for law, tuned in laws.items()
-        if set(tuned) == set(CROSSED) and all(id in each for each in rows for id in tuned.values())
+        if set(tuned) == set(tiers) and all(id in each for each in rows for id in tuned.values())
     }
 
 

@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from usm_baselines.benchmark.leaderboard import (
-    CROSSED,
-    LeaderboardResult,
-    Standing,
-    best_of_laws,
-)
+from usm_baselines.benchmark.leaderboard import LeaderboardResult, Standing, best_of_laws
 from usm_baselines.benchmark.results import axes_in
 from usm_baselines.benchmark.verdict import REASONS, TIERS, choices, front
 from usm_gym.rendering.plots import COLOURS, plotting, save
@@ -49,7 +44,7 @@ def _verdict(result: LeaderboardResult) -> Any:
     """Error against thrust variation, a panel per tier: what precision costs."""
     from matplotlib import pyplot as plt
 
-    tiers = {tier: result.suites[name] for tier, name in CROSSED.items() if name in result.suites}
+    tiers = result.tiers
     size = 4.2 * len(tiers), 4.4
     figure, panels = plt.subplots(1, len(tiers), figsize=size, squeeze=False, layout="constrained")
     for panel, (tier, rows) in zip(panels[0], tiers.items(), strict=True):

@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from usm_baselines.benchmark.leaderboard import (
-    CROSSED,
     Lead,
     LeaderboardResult,
     Standing,
@@ -149,11 +148,12 @@ def cross_table(result: LeaderboardResult) -> str:
     laws = crossed(result)
     if not laws:
         return ""
-    lines = [f"| law | tuned for | {' | '.join(CROSSED.values())} |", "|---|---|" + "---:|" * 3]
+    suites = result.board.tiers.values()
+    lines = [f"| law | tuned for | {' | '.join(suites)} |", "|---|---|" + "---:|" * len(suites)]
     for law, policies in laws.items():
         for tier, id in policies.items():
-            rows = {at: result.suites[suite][id] for at, suite in CROSSED.items()}
-            cells = [f"{_means(row.errors)}, {lost(row, True)} lost" for row in rows.values()]
+            rows = [each[id] for each in result.tiers.values()]
+            cells = [f"{_means(row.errors)}, {lost(row, True)} lost" for row in rows]
             lines.append(f"| {law} | {tier} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -217,8 +217,7 @@ def verdict(result: LeaderboardResult, figure: str, decisions: Mapping[str, floa
         figure: Where the figure is, from the page.
         decisions: As of `verdict_table`.
     """
-    axes = " + ".join(result.axes)
-    tiers = {tier: result.suites[name] for tier, name in CROSSED.items() if name in result.suites}
+    axes, tiers = " + ".join(result.axes), result.tiers
     parts = [f"{advice(tiers[TANK], decisions)}\n"] if TANK in tiers else []
     parts += [f"![Error {axes} against thrust variation, tier by tier]({figure})\n", FIGURE]
     for tier, rows in tiers.items():

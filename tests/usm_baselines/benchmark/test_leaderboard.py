@@ -18,6 +18,7 @@ from usm_baselines.benchmark import leaderboard_page
 from usm_baselines.benchmark.scoring import Job, Refusal
 from usm_baselines.benchmark.verdict import choices, front
 from usm_baselines.contender import contender
+from usm_baselines.gains import FOLDERS
 
 from usm_cli.commands.leaderboard import decision_times
 from usm_gym.evaluation import Evaluation, metric_names
@@ -28,14 +29,21 @@ from usm_gym.suites import NAMES, suite
 from usm_gym.task.nominal import shared_nominal
 
 ROOT = Path(__file__).parents[3]
-SUITES = {board.MAIN: short(3), "other": short(2, seed=1)}
+SUITES = {board.PLANE.main: short(3), "other": short(2, seed=1)}
 
 
-def test_every_suite_is_there_and_a_row_with_the_joints_still() -> None:
-    chosen = board.suites()
-    assert set(chosen) == {*(name for name in NAMES if "3d" not in name), board.STILL}
-    assert chosen["table1"] == suite("table1")
-    for moving, still in zip(chosen[board.MAIN], chosen[board.STILL], strict=True):
+def test_every_suite_is_on_one_board() -> None:
+    plane, space = board.PLANE.suites(), board.SPACE.suites()
+    assert {*plane, *space} == {*NAMES, board.PLANE.still, board.SPACE.still}
+    assert not {*plane} & {*space}
+    assert plane["table1"] == suite("table1")
+    assert space["torpedo3d"] == suite("torpedo3d")
+
+
+@pytest.mark.parametrize("which", [board.PLANE, board.SPACE])
+def test_a_board_has_a_row_with_the_joints_still(which: board.Board) -> None:
+    chosen = which.suites()
+    for moving, still in zip(chosen[which.main], chosen[which.still], strict=True):
         assert moving.shifts
         assert not still.shifts
         assert still == replace(moving, conditions=still.conditions)
@@ -56,7 +64,7 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
         (folder / "front" / f"mine-{weight}.json").write_text(text)
     registry.register("mine", registry.entry("pd").factory, "mine")
     assert registry.ids()[-2:] == ["mine", "mine-tuned"]
-    nominal = shared_nominal(SUITES[board.MAIN])
+    nominal = shared_nominal(SUITES[board.PLANE.main])
     tuned: Any = registry.make("mine-tuned", nominal)
     assert tuned.gains.k_p == 3.0
     assert "9 trials of 8 episodes" in registry.entry("mine-tuned").summary
@@ -64,7 +72,7 @@ def test_shipped_gains_are_registered_and_their_front_is_shown(
     made: list[Any] = [each.make(nominal) for each in fronts["mine"]]
     assert [each.gains.k_p for each in made] == [0.001, 0.01]
     places = board.places([], fronts, SUITES)
-    assert [place.suite for place in places] == [board.MAIN] * 2
+    assert [place.suite for place in places] == [board.PLANE.main] * 2
 
 
 def test_policies_meet_the_suites_that_they_are_meant_for(
@@ -91,8 +99,18 @@ def test_policies_meet_the_suites_that_they_are_meant_for(
 
 
 def test_a_law_is_one_whatever_its_gains() -> None:
-    for id in ("lqg-joints-tuned", "lqg-joints-basin", "lqg-joints-sea", "lqg-joints"):
-        assert board.law_of(id) == "lqg-joints"
+    for id in ("lqg-joints", *(f"lqg-joints-{suffix}" for suffix in FOLDERS)):
+        assert registry.law_of(id) == "lqg-joints"
+        assert registry.base_of(id) == "lqg-joints"
+    assert registry.base_of("sta-navigator-basin") == registry.base_of("sta-lag-tuned") == "sta"
+
+
+@pytest.mark.parametrize("which", [board.PLANE, board.SPACE])
+def test_a_result_knows_its_board_and_its_tiers(which: board.Board) -> None:
+    result = made_up({"pd": ""}, (which.main, f"{which.main}-sea"))
+    assert result.board == which
+    assert list(result.tiers) == ["field", "sea"]
+    assert result.tiers["field"] == result.main
 
 
 def made_up(
