@@ -118,7 +118,8 @@ class SpeedResult(Part, Result):
         growth: Costs for more links, robots and threads, if measured.
         machine: The machine.
         provenance: The origin of the figures.
-        decisions: How long policies take for a decision, for one robot, us.
+        decisions: How long policies take for a decision, for one robot in the plane, us.
+        spatial_decisions: The same in space.
     """
 
     kind: ClassVar[str] = "bench"
@@ -131,6 +132,7 @@ class SpeedResult(Part, Result):
     machine: Machine
     provenance: Provenance
     decisions: Mapping[str, Figure]
+    spatial_decisions: Mapping[str, Figure]
 
     def __post_init__(self) -> None:
         """Refuse medians of other figures."""

@@ -62,7 +62,13 @@ def speed(path):
     machine, source = result.machine, result.provenance
     where = f"{machine.processor}, {machine.cores} cores, {machine.system}"
     by = f"By `{source.command}`, commit {source.commit}, on {where}."
-    decisions = ["", "| a decision for one robot | median, us |", "|---|---:|"]
-    for id, spread in sorted(result.decisions.items(), key=lambda pair: pair[1].median):
-        decisions.append(f"| `{id}` | {figures(spread.median)} |")
-    return "\n".join([by, "", *lines, *decisions])
+    plane = decisions("a decision for one robot in the plane", result.decisions)
+    space = decisions("a decision for one robot in space", result.spatial_decisions)
+    return "\n".join([by, "", *lines, *plane, *space])
+
+
+def decisions(title, measured):
+    """How long policies take for a decision, as the lines of a table."""
+    order = sorted(measured.items(), key=lambda pair: pair[1].median)
+    rows = [f"| `{id}` | {figures(spread.median)} |" for id, spread in order]
+    return ["", f"| {title} | median, us |", "|---|---:|", *rows]

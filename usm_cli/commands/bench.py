@@ -34,12 +34,14 @@ from usm_gym.support.results import Provenance
 from usm_gym.support.text import figures
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD
+from usm_gym.task.modes import AnyMode
 
 DESCRIPTION = """\
 Measure the speed on this machine. Figures and their peers are measured in the same run, in turns,
 round by round. Prints medians with the smallest and largest values, and names the peers that are
 not installed (extra `bench`). Finer physics steps have their price beside the error that they
-leave, against the finest. The last table says how long every policy takes to decide for one robot.
+leave, against the finest. The last tables say how long every policy takes to decide for one robot,
+in the plane and in space.
 Takes some minutes; let the machine do nothing else meanwhile.
 """
 
@@ -53,6 +55,8 @@ PEERS = {
     "vector_env_ratio_cartpole": ("cartpole_vector_env_step_ns", "vector_env_step_ns"),
     "second_thread_speedup": ("vector_env_step_ns", "vector_env_two_threads_step_ns"),
 }
+# The modes in which decisions are timed: one in the plane, one in space.
+MAIN_MODES: tuple[AnyMode, ...] = ("operation", "operation3d")
 # The policy that decides where one does.
 POLICY = "sta"
 # Environment steps per second, and the cost of one that they follow from.
@@ -159,15 +163,18 @@ def run(arguments: argparse.Namespace) -> None:
     rows = list(benchmark.growth(min(rounds, 5))) if arguments.growth else []
     if rows:
         console.print(growth_table(rows))
-    decisions = decision_times(policies(), min(rounds, 5))
-    console.print(decisions_table(decisions))
+    decisions = {}
+    for mode in MAIN_MODES:
+        decisions[mode] = decision_times(policies(mode), min(rounds, 5), mode=mode)
+        console.print(decisions_table(mode, decisions[mode]))
     if arguments.output:
         result = SpeedResult(
             medians={name: figure.median for name, figure in measured.items()},
             spread=measured,
             missing=tuple(missing),
             growth=tuple(rows),
-            decisions=decisions,
+            decisions=decisions["operation"],
+            spatial_decisions=decisions["operation3d"],
             machine=benchmark.machine(),
             provenance=Provenance.here({"rounds": rounds}),
         )
@@ -288,9 +295,9 @@ def growth_table(rows: list[Growth]) -> Table:
     return table
 
 
-def decisions_table(decisions: Mapping[str, Figure]) -> Table:
-    """How long policies take for a decision, the fastest first, for the terminal."""
-    table = empty_table("policy", numbers=("us per decision", "smallest", "largest"))
+def decisions_table(mode: str, decisions: Mapping[str, Figure]) -> Table:
+    """How long policies take for a decision in a mode, the fastest first, for the terminal."""
+    table = empty_table(f"policy, {mode}", numbers=("us per decision", "smallest", "largest"))
     for id, figure in sorted(decisions.items(), key=lambda pair: pair[1].median):
         table.add_row(id, *map(figures, (figure.median, figure.low, figure.high)))
     return table

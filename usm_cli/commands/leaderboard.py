@@ -99,16 +99,26 @@ def run(arguments: argparse.Namespace) -> None:
             figure = Path(os.path.relpath(folder / "verdict.svg", Path(arguments.insert).parent))
             write_text(
                 arguments.insert,
-                with_table(page, result, figure.as_posix(), decision_times(folder)),
+                with_table(
+                    page, result, figure.as_posix(), decision_times(folder, arguments.space)
+                ),
             )
         draw_all(result, folder)
     output_console().print(Markdown(table(result.main)))
     leave_if_refused({id: why for rows in result.refused.values() for id, why in rows.items()})
 
 
-def decision_times(folder: Path) -> dict[str, float]:
-    """How long policies take for a decision, us, if `usm bench` has left that beside the tables."""
-    path = folder / "bench.json"
+def decision_times(folder: Path, space: bool = False) -> dict[str, float]:
+    """How long policies take for a decision, us, if `usm bench` has left that beside the tables.
+
+    Args:
+        folder: Folder of the leaderboard; that of the leaderboard in space is inside the one where
+            the file of `usm bench` is.
+        space: Whether for the robot in space.
+    """
+    path = (folder.parent if space else folder) / "bench.json"
     if not path.exists():
         return {}
-    return {id: figure.median for id, figure in SpeedResult.read(path).decisions.items()}
+    speed = SpeedResult.read(path)
+    decisions = speed.spatial_decisions if space else speed.decisions
+    return {id: figure.median for id, figure in decisions.items()}
