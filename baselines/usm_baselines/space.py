@@ -49,8 +49,12 @@ class Range:
 
 Space = Mapping[str, Range]
 # Where gains are looked for in space, if elsewhere than in the plane: what noise an observer makes
-# has to move 86 kg there.
-SPATIAL_RANGES = {"observer_gain": Range(1e-4, 100.0, "m/s^3")}
+# has to move 86 kg there, which takes longer, too. Over a horizon as short as the thrusters' lag,
+# `mpc` loses the robot.
+SPATIAL_RANGES = {
+    "observer_gain": Range(1e-4, 100.0, "m/s^3"),
+    "horizon": Range(0.1, 1.5, "s"),
+}
 
 
 class Gain(float):

@@ -3,25 +3,40 @@
 import json
 
 import pytest
-from usm_baselines import gains, registry
+from usm_baselines import gains, registry, tiers
+from usm_baselines.space import in_mode
 
 from usm_gym.suites import suite
+from usm_gym.task.conditions import IN_SPACE
 
-TIERS = {
-    "field": [*gains.TUNED.glob("*.json"), *gains.FRONT.glob("*.json")],
-    "basin": [*(gains.TUNED / "basin").glob("*.json")],
-    "sea": [*(gains.TUNED / "sea").glob("*.json")],
+# By tier, in space with "3d" behind it, the folder of its gains.
+FOLDERS = {
+    "field": ".",
+    "basin": "basin",
+    "sea": "sea",
+    "field3d": "eely",
+    "basin3d": "eely/basin",
+    "sea3d": "eely/sea",
 }
+TIERS = {tier: sorted((gains.TUNED / folder).glob("*.json")) for tier, folder in FOLDERS.items()}
+TIERS["field"] += sorted(gains.FRONT.glob("*.json"))
 FILES = sorted(file for files in TIERS.values() for file in files)
 # Nearer to an end of its range than this share of it, a gain is one that the range has chosen.
 MARGIN = 0.05
 
 
 def test_shipped_gains_can_be_made() -> None:
-    nominal = suite("operation")[0].nominal
-    for file in FILES:
-        found = gains.read_gains(file)
-        registry.make(found.policy, nominal, **found.gains)
+    for tier, files in TIERS.items():
+        nominal = suite("operation3d" if tier.endswith(IN_SPACE) else "operation")[0].nominal
+        for file in files:
+            found = gains.read_gains(file)
+            registry.make(found.policy, nominal, **found.gains)
+
+
+def test_every_tier_has_gains() -> None:
+    assert set(FOLDERS) == {"field", *tiers.TIERS}
+    assert set(FOLDERS.values()) == {folder or "." for folder in gains.FOLDERS.values()}
+    assert all(TIERS.values())
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -47,10 +62,31 @@ def test_every_law_has_shipped_gains() -> None:
     assert {file.stem for file in gains.TUNED.glob("*.json")} == laws - BEYOND_FIELD
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parent.name}-{file.stem}")
-def test_no_shipped_gain_lies_at_an_end_of_its_range(file) -> None:
+# Laws for which the board in space has no gains of their own: forms of others.
+ONLY_IN_THE_PLANE = {"sta-shtessel", "sta-shtessel-lag", "agsta", "agsta-lag", "gsta", "ladrc"}
+ONLY_IN_THE_PLANE |= {"pd-lag", "pd-mass", "pd-mass-lag", "pd-observer", "smc-lag"}
+
+
+def test_the_laws_of_the_plane_have_gains_in_space_but_for_some_of_their_forms() -> None:
+    plane, space = ({file.stem for file in TIERS[tier]} for tier in ("basin", "basin3d"))
+    assert space == plane
+    assert {file.stem for file in TIERS["sea3d"]} == space
+    plane = {file.stem for file in gains.TUNED.glob("*.json")}
+    assert {file.stem for file in TIERS["field3d"]} == plane - ONLY_IN_THE_PLANE | {
+        "adaptive",
+        "informed",
+    }
+
+
+@pytest.mark.parametrize(
+    ("tier", "file"),
+    [(tier, file) for tier, files in TIERS.items() for file in files],
+    ids=lambda part: part if isinstance(part, str) else part.stem,
+)
+def test_no_shipped_gain_lies_at_an_end_of_its_range(tier, file) -> None:
     found = gains.read_gains(file)
-    space = registry.entry(found.policy).space
+    mode = "operation3d" if tier.endswith(IN_SPACE) else "operation"
+    space = in_mode(registry.entry(found.policy).space, mode)
     assert set(found.gains) == set(space)
     for name, span in space.items():
         assert MARGIN < span.place(found.gains[name]) < 1.0 - MARGIN, name
