@@ -38,7 +38,7 @@ OPTIONS = (
         "algorithm",
         str,
         "A",
-        "ppo, recurrent-ppo, sac, td3, tqc, estimator (with --action estimates), or "
+        "ppo, smooth-ppo, recurrent-ppo, sac, td3, tqc, estimator (with --action estimates), or "
         "my_module:mine, where importing my_module registers your own learner as mine "
         "(default: ppo)",
     ),

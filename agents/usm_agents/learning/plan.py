@@ -36,9 +36,9 @@ class Plan:
     """What is trained, and how long.
 
     Attributes:
-        algorithm: "ppo", "recurrent-ppo", "sac", "td3", "tqc" or "estimator", or a name that is
-            registered with `usm_agents.learning.learner`, or "module:name" of one that the module
-            registers; the module is imported when the training begins.
+        algorithm: "ppo", "smooth-ppo", "recurrent-ppo", "sac", "td3", "tqc" or "estimator", or a
+            name that is registered with `usm_agents.learning.learner`, or "module:name" of one that
+            the module registers; the module is imported when the training begins.
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, 1e-6 to 1000 N and N m.

@@ -24,6 +24,15 @@ _PPO: dict[str, Any] = {
     "target_kl": 0.03,
     "log_std_init": -1.5,  # small exploration around the base
 }
+# Exploration that depends on what is seen and changes only now and then (gSDE; Raffin, Kober and
+# Stulp, CoRL 2022). A heavy robot feels nothing of noise that is new in every period.
+_SMOOTH = _PPO | {
+    "use_sde": True,
+    "sde_sample_freq": 8,
+    "log_std_init": -3.3,  # of weights, and so of as much as above in all
+    "gamma": 0.97,
+    "gae_lambda": 0.95,
+}
 _RECURRENT = _PPO | {"hidden": (64,), "units": 64, "batch_size": 2048, "n_steps": 64}  # LSTM units
 _REPLAY: dict[str, Any] = {
     "hidden": (64, 64),
@@ -43,6 +52,7 @@ _FEW = {"robots": 32, **_REWARD}
 
 SETTINGS: dict[str, dict[str, Any]] = {
     "ppo": _PPO | _MANY,
+    "smooth-ppo": _SMOOTH | _MANY,
     "recurrent-ppo": _RECURRENT | _MANY,
     "sac": _REPLAY | {"ent_coef": "auto_0.01"} | _FEW,
     "td3": _REPLAY | {"noise": 0.2} | _FEW,  # standard deviation, independent in each step

@@ -44,7 +44,7 @@ def errors(curve):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("algorithm", ["ppo", "recurrent-ppo"])
+@pytest.mark.parametrize("algorithm", ["ppo", "smooth-ppo", "recurrent-ppo"])
 def test_a_training_that_is_stopped_goes_on_bit_for_bit(algorithm, tmp_path):
     robots = SETTINGS[algorithm]["robots"]
     plan = Plan(algorithm=algorithm, steps=256 * robots, interval=64 * robots)

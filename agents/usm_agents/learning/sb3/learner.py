@@ -37,6 +37,8 @@ class SB3Learner:
         self._vec_env.action_space.seed(setup.seed)
         self._model = make_model(setup.algorithm, setup.settings, self._vec_env)
         self._started = False
+        # Of a checkpoint that was read, until learning goes on.
+        self._random_states: Any = None
 
     @property
     def steps(self) -> int:
@@ -54,8 +56,15 @@ class SB3Learner:
         self._model.set_logger(configure(str(self._setup.folder), ["tensorboard"]))
 
         def before_rollout() -> None:
+            # Smooth exploration has been drawn by now: before a checkpoint is written here, and
+            # once more after it is read. What follows is drawn from the states of the checkpoint.
+            if self._random_states is not None:
+                _set_random_states(self._random_states)
+                self._random_states = None
             self._check()
             pause()
+            if self._model.use_sde:
+                self._model.policy.reset_noise(self._vec_env.num_envs)  # type: ignore[operator]
 
         try:
             self._model.learn(
@@ -96,11 +105,11 @@ class SB3Learner:
         )
         if (checkpoint / REPLAY).exists():
             self._model.load_replay_buffer(checkpoint / REPLAY, truncate_last_traj=False)  # type: ignore[attr-defined]
-        robots, lstm_states, random_states = pickle.loads((checkpoint / STATES).read_bytes())
+        states = pickle.loads((checkpoint / STATES).read_bytes())
+        robots, lstm_states, self._random_states = states
         self._vec_env.restore(robots)
         if lstm_states is not None:
             self._model._last_lstm_states = lstm_states  # type: ignore[attr-defined]
-        _set_random_states(random_states)
         self._started = True
 
     def _check(self) -> None:

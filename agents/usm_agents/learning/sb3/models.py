@@ -20,6 +20,7 @@ from usm_agents.artifact.network import Network, Recurrence
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {
     "ppo": PPO,
+    "smooth-ppo": PPO,
     "recurrent-ppo": RecurrentPPO,
     "sac": SAC,
     "td3": TD3,
@@ -27,7 +28,7 @@ CLASSES: dict[str, type[BaseAlgorithm]] = {
 }
 # Settings that say what the reward is, and not how it is learned from.
 REWARD = ("reward_scale", "variation_price")
-ON_POLICY = ("ppo", "recurrent-ppo")
+ON_POLICY = ("ppo", "smooth-ppo", "recurrent-ppo")
 
 
 @dataclass(frozen=True)
