@@ -61,9 +61,10 @@ class ForceLog:
         """Act as the policy does."""
         action, state = self._policy.predict(observation, state, start, deterministic, **truth)
         memory = state[0] if isinstance(state, tuple) else None
-        axes, angles = len(self._world.axes), len(self._world.attitude)
-        allocation = np.empty((len(observation), axes + angles, self._world.thrusters))
-        self._world.allocate(observation, allocation)
+        world = self._world
+        axes, angles = len(world.axes), len(world.attitude) + len(world.watched)
+        allocation = np.empty((len(observation), axes + angles, world.thrusters))
+        world.allocate(observation, allocation)
         forces = allocation[:, :axes]
         self.total.append(np.einsum("bwt,bt->bw", forces, action * self._limit))
         if isinstance(memory, Memory) and memory.base_action.size:
