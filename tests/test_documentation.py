@@ -18,10 +18,10 @@ from support import axe
 from support.trainings import brief, shorten
 from usm_agents.artifact.folder import PRETRAINED
 from usm_agents.learning import training
+from usm_baselines.benchmark.leaderboard import Board
 
 import usm_gym
 from usm_cli import selection
-from usm_cli.commands import leaderboard
 from usm_cli.program import main
 
 ROOT = Path(__file__).parents[1]
@@ -98,8 +98,12 @@ def folder(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "results", tmp_path / "results")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
-    few = {name: [*map(brief, frozen[:2])] for name, frozen in leaderboard.suites().items()}
-    monkeypatch.setattr(leaderboard, "suites", lambda: few)
+    whole = Board.suites
+
+    def few(board):
+        return {name: [*map(brief, frozen[:2])] for name, frozen in whole(board).items()}
+
+    monkeypatch.setattr(Board, "suites", few)
     shorten(monkeypatch)
     unseen, suite = selection.unseen, selection.suite
     monkeypatch.setattr(selection, "unseen", lambda *given: [*map(brief, unseen(*given))])

@@ -5,6 +5,7 @@ import re
 import figures
 import published
 import usm_baselines
+from usm_baselines.benchmark.leaderboard import PLANE, SPACE
 from usm_baselines.gains import FOLDERS
 from usm_baselines.registry import entry
 from usm_baselines.space import declared
@@ -12,12 +13,21 @@ from usm_baselines.space import declared
 from usm_gym.support.text import figures as in_figures
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
+from usm_gym.task.conditions import IN_SPACE
 
+# The suites whose scores are shown, by board.
 SHOWN = {
-    "operation": "field",
-    "operation-ideal": "ideal",
-    "operation-basin": "basin",
-    "operation-sea": "sea",
+    PLANE: {
+        "operation": "field",
+        "operation-ideal": "ideal",
+        "operation-basin": "basin",
+        "operation-sea": "sea",
+    },
+    SPACE: {
+        "operation3d": "field, in space",
+        "operation3d-basin": "basin, in space",
+        "operation3d-sea": "sea, in space",
+    },
 }
 # Where a page has `<!-- law: ID, ID -->`, for policies that share a class of gains.
 PLACE = re.compile(r"<!-- law: (.+?) -->")
@@ -26,13 +36,13 @@ PLACE = re.compile(r"<!-- law: (.+?) -->")
 def filled(text):
     """A page with laws in their places."""
     laws = [ids.split(", ") for ids in PLACE.findall(text)]
-    everyone = [id for ids in laws for id in shipped(ids)]
+    everyone = [id for ids in laws for id in in_the_plane(shipped(ids))]
     return PLACE.sub(lambda match: law(match[1].split(", "), everyone), text)
 
 
 def law(ids, everyone):
     """Gains, an episode and the scores of a law."""
-    shown = shipped(ids)
+    shown = in_the_plane(shipped(ids))
     others = [id for id in everyone if id not in shown]
     names = ", ".join(f"<code>{id}</code>" for id in shown)
     caption = (
@@ -40,7 +50,8 @@ def law(ids, everyone):
         f"{names}; grey: the other laws of this page; dotted: when the joints start to move."
     )
     figure = f"<figure>{figures.errors(shown, others)}<figcaption>{caption}</figcaption></figure>"
-    return "\n\n".join([gains(ids), figure, scores(shown)])
+    tables = [scores(board, shipped(ids)) for board in SHOWN]
+    return "\n\n".join([gains(ids), figure, *filter(None, tables)])
 
 
 def shipped(ids):
@@ -50,6 +61,11 @@ def shipped(ids):
         require(id in known, "law", id, ", ".join(known))
     gains = ("", *(f"-{suffix}" for suffix in FOLDERS))
     return [id + kind for id in ids for kind in gains if id + kind in known]
+
+
+def in_the_plane(ids):
+    """Those of policies whose gains are not for a robot in space."""
+    return [id for id in ids if not entry(id).tuned_for.endswith(IN_SPACE)]
 
 
 def gains(ids):
@@ -75,24 +91,21 @@ def made(id):
     return usm_baselines.make(id, figures.scenario().nominal).gains
 
 
-def scores(ids):
-    """The rows of policies in the leaderboard."""
-    board = published.leaderboard()
-    lines = [
-        row(
-            f"{' / '.join(board.axes)}, mm",
-            *(f"`{conditions}`" for conditions in SHOWN.values()),
-            "variation, N/s",
-        ),
-        "|---|" + "---:|" * (len(SHOWN) + 1),
-    ]
+def scores(board, ids):
+    """The rows of policies in a leaderboard; empty if it has none of them."""
+    result, suites = published.leaderboard(board), SHOWN[board]
+    lines = []
     for id in ids:
-        rows = [board.suites[suite].get(id) for suite in SHOWN]
+        rows = [result.suites[suite].get(id) for suite in suites] if result else []
         scored = [score for score in rows if score is not None]
         if scored:
             variation = in_figures(scored[0].metrics["thrust_variation"].mean)
             lines.append(row(f"`{id}`", *map(errors, rows), variation))
-    return "\n".join(lines)
+    if not lines:
+        return ""
+    axes = f"{' / '.join(result.axes)}, mm"
+    head = row(axes, *(f"`{conditions}`" for conditions in suites.values()), "variation, N/s")
+    return "\n".join([head, "|---|" + "---:|" * (len(suites) + 1), *lines])
 
 
 def errors(score):

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from usm_baselines.benchmark.leaderboard import LeaderboardResult
+from usm_baselines.benchmark.leaderboard import PLANE, SPACE, LeaderboardResult
 from usm_baselines.benchmark.leaderboard_page import verdict
 
 import usm_gym
@@ -15,7 +15,9 @@ from usm_cli.speed import SpeedResult
 from usm_gym.support.text import figures
 
 FOLDER = Path(__file__).parents[2] / "results" / usm_gym.__version__
-VERDICT = "<!-- verdict -->"
+# Folders of the boards, and where their figures are in the site.
+FOLDERS = {PLANE: FOLDER, SPACE: FOLDER / "space"}
+VERDICTS = {PLANE: "<!-- verdict -->", SPACE: "<!-- verdict in space -->"}
 SPEED, FINDINGS = "<!-- bench.json -->", "<!-- bench.json: findings -->"
 # Whose episodes the report replays; others would make it large.
 REPLAYED = "estimator-lqg-joints,adaptive,sta"
@@ -32,9 +34,12 @@ def report():
 
 def filled(text):
     """A page with what its marks stand for."""
-    if VERDICT in text:
-        shown = verdict(leaderboard(), "results/verdict.svg", decision_times(FOLDER))
-        text = text.replace(VERDICT, shown)
+    for board, mark in VERDICTS.items():
+        if mark in text:
+            result, figure = leaderboard(board), FOLDERS[board].relative_to(FOLDER) / "verdict.svg"
+            known = decision_times(FOLDERS[board], space=board is SPACE)
+            shown = verdict(result, f"results/{figure.as_posix()}", known) if result else ""
+            text = text.replace(mark, shown)
     if SPEED in text:
         path = FOLDER / "bench.json"
         said = findings(SpeedResult.read(path).spread) if path.exists() else []
@@ -43,9 +48,10 @@ def filled(text):
 
 
 @cache
-def leaderboard():
-    """The leaderboard of this version."""
-    return LeaderboardResult.read(FOLDER / "leaderboard.json")
+def leaderboard(board):
+    """A leaderboard of this version; None if there is none yet."""
+    path = FOLDERS[board] / "leaderboard.json"
+    return LeaderboardResult.read(path) if path.exists() else None
 
 
 def speed(path):
