@@ -40,9 +40,9 @@ from usm_gym.support.files import read_json
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.text import counted, figures, listed
 from usm_gym.support.validation import require
-from usm_gym.task.conditions import PRESETS
+from usm_gym.task.conditions import IN_SPACE
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
-from usm_gym.task.modes import AnyScenario
+from usm_gym.task.modes import AnyScenario, presets_of
 from usm_gym.task.stored_scenario import OtherScenario
 from usm_gym.world import world_of
 
@@ -232,7 +232,8 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     homes = result.homes.items()
     _, first = next(iter(homes))
     rows = by_objective({name: row.home for name, row in first.competitors.items()})
-    episodes = unseen(first.mode, PRESETS[first.tier], result.seed, result.episodes)
+    conditions = presets_of(first.mode)[first.tier.removesuffix(IN_SPACE)]
+    episodes = unseen(first.mode, conditions, result.seed, result.episodes)
     tables = [pair for name, home in homes for pair in sets(name, home).items()]
     return Chapter(
         title="Study of learned agents",

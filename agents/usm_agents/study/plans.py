@@ -9,7 +9,14 @@ from typing import Any
 
 from usm_agents.learning.plan import Plan
 from usm_gym.support.validation import require
-from usm_gym.task.conditions import FIELD, IN_SPACE, PRESETS, Conditions, preset_of
+from usm_gym.task.conditions import (
+    FIELD,
+    IN_SPACE,
+    PRESETS,
+    SPATIAL_PRESETS,
+    Conditions,
+    preset_of,
+)
 from usm_gym.task.modes import AnyMode, presets_of
 
 FORESEEN = ("foreseen_error_2", "foreseen_error_5", "foreseen_error_10", "foreseen_rate")
@@ -31,10 +38,21 @@ JOINT_REFERENCES = (
     "reference_deflection_acceleration",
     "bending_joints",
 )
-BASIN, SEA = PRESETS["basin"], PRESETS["sea"]
+BASIN, SEA, SPACE = PRESETS["basin"], PRESETS["sea"], SPATIAL_PRESETS["field"]
 _RESIDUAL = Plan()
 # A round of its learner takes 256 000 steps in `field`, and 384 000 in a tier of scans.
 _ESTIMATOR = Plan(algorithm="estimator", action="estimates", steps=4_600_000, interval=380_000)
+
+# The largest residual is as large as the limit of a thruster.
+_RESIDUAL_IN_SPACE = replace(
+    _RESIDUAL,
+    algorithm="smooth-ppo",
+    env="usm_agents:USM-Operation3DResidual-v0",
+    residual_scale=40.0,
+    conditions=SPACE,
+    steps=2_000_000,
+    interval=200_000,
+)
 
 # The agents that are shipped, each as its seed 0. One whose base is another agent comes after it.
 AGENTS: dict[str, Plan] = {
@@ -52,6 +70,16 @@ AGENTS: dict[str, Plan] = {
     "estimator-sta-navigator-sea": replace(_ESTIMATOR, base="sta-navigator-sea", conditions=SEA),
     "residual-sta-navigator-basin": replace(
         _RESIDUAL, base="estimator-sta-navigator-basin", conditions=BASIN
+    ),
+    "residual-eely": _RESIDUAL_IN_SPACE,
+    "residual-torpedo-eely": replace(_RESIDUAL_IN_SPACE, env="usm_agents:USM-Torpedo3DResidual-v0"),
+    "estimator-lqg-joints-eely": replace(
+        _ESTIMATOR,
+        env=_RESIDUAL_IN_SPACE.env,
+        base="lqg-joints-eely",
+        conditions=SPACE,
+        steps=3_000_000,
+        interval=250_000,
     ),
 }
 
@@ -91,6 +119,8 @@ HEADLINES = (
     "estimator-lqg-joints",
     "estimator-lqg-joints-basin",
     "residual-sta-navigator-basin",
+    "residual-eely",
+    "estimator-lqg-joints-eely",
 )
 FEWER = {
     "estimator-lqg-joints-sea": 3,
@@ -121,20 +151,37 @@ RIVALS: dict[str, tuple[str, ...]] = {
         "informed-basin",
     ),
     "sea": ("sta-navigator-sea", "indi-sea", "lqg-joints-sea", "adaptive-sea", "informed-sea"),
+    "field3d": (
+        "sta",
+        "sta-eely",
+        "pd-eely",
+        "lqg-joints-eely",
+        "mpc-eely",
+        "adaptive-eely",
+        "informed-eely",
+    ),
 }
+
+
+def _elsewhere(home: Conditions, ideal: Conditions) -> dict[str, Conditions]:
+    """Conditions that differ from those of a field in one thing each."""
+    return {
+        "ideal": ideal,
+        "still": replace(home, motion=False),
+        "exact": exact(home),
+        "coefficients": replace(home, coefficient_range=(0.6, 1.4)),
+        "delay": replace(home, position_delay=1),
+        "noise": replace(home, position_noise=1e-3),
+        "lag": replace(home, thruster_time_constant=2 * home.thruster_time_constant),
+    }
+
+
 # Where those of a tier are taken that they have not been made for.
 ELSEWHERE: dict[str, dict[str, Conditions]] = {
-    "field": {
-        "ideal": PRESETS["ideal"],
-        "still": replace(FIELD, motion=False),
-        "exact": exact(FIELD),
-        "coefficients": replace(FIELD, coefficient_range=(0.6, 1.4)),
-        "delay": replace(FIELD, position_delay=1),
-        "noise": replace(FIELD, position_noise=1e-3),
-        "lag": replace(FIELD, thruster_time_constant=0.1),
-    },
+    "field": _elsewhere(FIELD, PRESETS["ideal"]),
     "basin": {"sea": SEA, "exact": exact(BASIN)},
     "sea": {"basin": BASIN},
+    "field3d": _elsewhere(SPACE, SPATIAL_PRESETS["ideal"]),
 }
 
 
@@ -152,8 +199,9 @@ class Home:
 
     @property
     def name(self) -> str:
-        """How it is called: the tier, and the mode if it is not that of the main suite."""
-        return self.tier if self.mode == "operation" else f"{self.mode}-{self.tier}"
+        """How it is called: the tier, and the mode if it is not that of a main suite."""
+        main = self.mode in ("operation", "operation3d")
+        return self.tier if main else f"{self.mode}-{self.tier.removesuffix(IN_SPACE)}"
 
     @property
     def sets(self) -> dict[str, Conditions]:

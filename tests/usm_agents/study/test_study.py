@@ -27,7 +27,8 @@ from usm_gym import statistics
 from usm_gym.evaluation import SHIFT_METRICS, Evaluation
 from usm_gym.statistics import interval, ratio_interval
 from usm_gym.support.files import write_json
-from usm_gym.task.conditions import FIELD, PRESETS
+from usm_gym.task.conditions import FIELD, IN_SPACE, PRESETS
+from usm_gym.task.modes import presets_of
 from usm_gym.task.nominal import shared_nominal
 
 
@@ -196,9 +197,14 @@ def test_an_ablation_is_the_ablated_agent_but_for_one_thing(tmp_path):
 def test_homes_are_the_conditions_and_modes_of_the_trainings():
     assert home_of("residual-torpedo") == Home("field", "torpedo")
     assert home_of("residual-torpedo").name == "torpedo-field"
+    assert home_of("residual-torpedo-eely") == Home("field3d", "torpedo3d")
+    assert home_of("residual-torpedo-eely").name == "torpedo3d-field"
+    assert home_of("residual-eely").name == "field3d"
     for name, plan in AGENTS.items():
         home = home_of(name)
-        assert PRESETS[home.tier] == plan.conditions == home.sets[home.tier]
+        presets = presets_of(home.mode)
+        assert presets[home.tier.removesuffix(IN_SPACE)] == plan.conditions == home.conditions
+        assert home.sets[home.tier] == plan.conditions
         assert plan.mode == home.mode
         # No worse than its base can be read off: it is a rival.
         assert plan.base in plans.rivals_of(home, [name]).values()
