@@ -19,8 +19,8 @@ import usm_gym
 
 FILE = Path(__file__).parents[1] / "data" / "scores.json"
 # By suite, the episode of it.
-EPISODES = {"operation": 0, "operation-basin": 1, "torpedo": 2}
-POLICIES = (
+EPISODES = {"operation": 0, "operation-basin": 1, "torpedo": 2, "operation3d": 3, "torpedo3d": 4}
+IN_THE_PLANE = (
     "sta",
     "pd",
     "pid",
@@ -30,6 +30,12 @@ POLICIES = (
     "residual-ppo",
     "estimator-lqg-joints",
 )
+IN_SPACE = ("sta", "pd", "sta-lag-eely", "lqg-joints-eely")
+PAIRS = [
+    (suite, policy)
+    for suite in EPISODES
+    for policy in (IN_SPACE if suite.endswith("3d") else IN_THE_PLANE)
+]
 
 
 def scores(policy: str, suite: str) -> dict[str, float]:
@@ -61,7 +67,9 @@ def recorded() -> dict[str, Any]:
 
 def main() -> None:
     """Record everything anew."""
-    episodes = {suite: {policy: scores(policy, suite) for policy in POLICIES} for suite in EPISODES}
+    episodes: dict[str, dict[str, dict[str, float]]] = {suite: {} for suite in EPISODES}
+    for suite, policy in PAIRS:
+        episodes[suite][policy] = scores(policy, suite)
     now = {"episodes": episodes, "first_second": first_second()}
     FILE.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
 

@@ -24,6 +24,7 @@ FORMS = {
     "tuned": "the same law with gains from usm tune, for field",
     "basin": "the same law with gains for basin",
     "sea": "the same law with gains for sea",
+    "eely": "the same law with gains for the robot in space",
 }
 
 
