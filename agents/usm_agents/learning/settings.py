@@ -25,7 +25,7 @@ _PPO: dict[str, Any] = {
     "log_std_init": -1.5,  # small exploration around the base
 }
 # Exploration that depends on what is seen and changes only now and then (gSDE; Raffin, Kober and
-# Stulp, CoRL 2022). A heavy robot feels nothing of noise that is new in every period.
+# Stulp, CoRL 2021). A heavy robot feels nothing of noise that is new in every period.
 _SMOOTH = _PPO | {
     "use_sde": True,
     "sde_sample_freq": 8,
