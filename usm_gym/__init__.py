@@ -10,6 +10,7 @@ from usm_gym.registration import register_environments
 from usm_gym.robot import Robot, Thruster
 from usm_gym.spatial_dynamics import spatial_accelerations
 from usm_gym.spatial_robot import Link, SpatialRobot, SpatialThruster
+from usm_gym.spatial_vehicle import SpatialVehicle
 from usm_gym.spatial_world import SpatialWorld
 from usm_gym.statistics import compare
 from usm_gym.suites import suite
@@ -36,6 +37,7 @@ __all__ = [
     "SpatialRobot",
     "SpatialScenario",
     "SpatialThruster",
+    "SpatialVehicle",
     "SpatialWater",
     "SpatialWave",
     "SpatialWorld",

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from usm_gym.base_vehicle import Array, BaseVehicle
 from usm_gym.linear_model import LinearModel, Variable
 from usm_gym.robot import Robot
 from usm_gym.support.validation import real_array, require
 from usm_gym.task.nominal import Nominal
-from usm_gym.world import world_of
-
-Array = NDArray[np.float64]
-
-# Time constant of the filter behind a rate that is taken from positions, s.
-RATE_FILTER = 0.02
-# What `read` keeps, first of all whether the episode has begun.
-BEGUN, AGE, ERROR, RATE, FORCES = slice(0, 1), slice(1, 2), slice(2, 4), slice(4, 6), slice(6, None)
 
 
-class Vehicle:
+class Vehicle(BaseVehicle):
     """The nominal robot as a controller deals with it.
 
     It knows what may be known beforehand, and nothing that is drawn for an episode. All arrays may
@@ -51,13 +43,8 @@ class Vehicle:
         Raises:
             ValueError: If it is none, or that of a robot that is not the planar one.
         """
-        require(isinstance(nominal, Nominal), "nominal", nominal, "a Nominal, as environments have")
-        require(isinstance(nominal.robot, Robot), "robot", nominal.robot, "the planar robot")
-        self.nominal = nominal
+        super().__init__(nominal, Robot, "the planar robot")
         self.robot: Robot = nominal.robot
-        self.period = nominal.control_period
-        self.mass = self.robot.total_mass
-        self._world = world_of(self.robot)
 
     def read(
         self, observation: ArrayLike, memory: ArrayLike | None = None, episode_start: Any = None
@@ -93,52 +80,17 @@ class Vehicle:
         Raises:
             ValueError: If a shape is wrong.
         """
-        given, layout = real_array("observation", observation), self._world.layout
-        shape, allowed = given.shape, f"({layout.size},) or (batch, {layout.size})"
-        require(shape[-1:] == (layout.size,), "the observation's shape", shape, allowed)
-        values = given * layout.scale
-        seen = SimpleNamespace(**{name: values[..., part] for name, part in layout.slices.items()})
-        links, thrusters = self.robot.links, len(self.robot.thrusters)
-        allocation = np.empty((math.prod(shape[:-1]), 3, thrusters))
-        self._world.allocate(given.reshape(-1, layout.size).astype(np.float32), allocation)
-        seen.allocation = allocation.reshape(*shape[:-1], 3, thrusters)
+        seen, kept = self._read(observation, memory, episode_start)
         bends = np.cumsum(seen.joint_angles, axis=-1)
         seen.link_angles = np.concatenate([seen.tail_angle, seen.tail_angle - bends], axis=-1)
         # Joint i turns the links between it and the head.
-        turned = np.arange(links - 1, 0, -1) / links
+        turned = np.arange(self.robot.links - 1, 0, -1) / self.robot.links
         turning = (seen.joint_rates * turned).sum(axis=-1, keepdims=True)
         seen.heading_rate = seen.tail_rate - turning
-        return seen, self._remember(seen, self._memory(shape[:-1], memory, episode_start))
-
-    def allocate(self, force: ArrayLike, moment: ArrayLike, seen: SimpleNamespace) -> Array:
-        """Share a force and a moment out among the thrusters, with as little force as possible.
-
-        The body's shape at the moment counts. What is beyond the limit of a thruster saturates when
-        it is applied.
-
-        Args:
-            force: Force on the centre of mass, global frame, N, (..., 2).
-            moment: Moment about it, anticlockwise, N m, (..., 1).
-            seen: What `read` has returned.
-
-        Returns:
-            The action: commands over the thruster limit, (..., thrusters).
-
-        Raises:
-            ValueError: If a shape is wrong.
-        """
-        batch = seen.allocation.shape[:-2]
-        wanted = []
-        for name, value, size in (("force", force, 2), ("moment", moment, 1)):
-            array = real_array(name, value)
-            allowed = f"shape {(*batch, size)}"
-            require(array.shape == (*batch, size), f"shape of the {name}", array.shape, allowed)
-            wanted.append(array)
-        wrench = np.concatenate(wanted, axis=-1)[..., np.newaxis]
-        T = seen.allocation
-        transposed = np.swapaxes(T, -1, -2)
-        forces = transposed @ np.linalg.solve(T @ transposed, wrench)
-        return np.asarray(forces[..., 0] / seen.thruster_limit)
+        state = [seen.position_error, seen.heading_error, seen.velocity_error, seen.heading_rate]
+        lagging = [seen.wrench] if self.nominal.thruster_time_constant > 0.0 else []
+        seen.state = np.concatenate([*state, *lagging], axis=-1)
+        return seen, kept
 
     def inertia(self, link_angles: ArrayLike | None = None) -> Array:
         """Inertia of the robot with the water that moves along, its joints held.
@@ -225,36 +177,3 @@ class Vehicle:
         inertia = inertia + (robot.link_inertia + robot.added_inertia) * turning
         drag = robot.tangential_drag * squares[0] + robot.normal_drag * squares[1]
         return inertia, drag + robot.linear_yaw_drag * turning
-
-    def _memory(self, batch: tuple[int, ...], memory: ArrayLike | None, start: Any) -> Array:
-        shape = (*batch, FORCES.start + len(self.robot.thrusters))
-        if memory is None:
-            return np.zeros(shape)
-        kept = np.array(real_array("memory", memory), np.float64)
-        require(kept.shape == shape, "shape of the memory", kept.shape, f"{shape}")
-        kept[np.broadcast_to(np.asarray(start, bool), batch)] = 0.0
-        return kept
-
-    def _remember(self, seen: SimpleNamespace, memory: Array) -> Array:
-        """Move the memory on by an observation, and fill in what follows from it."""
-        begun = memory[..., BEGUN] > 0.0
-        # Between two measured positions; no new one, no time.
-        passed = memory[..., AGE] + self.period - seen.position_age
-        fresh = passed > 0.5 * self.period
-        slope = (seen.position_error - memory[..., ERROR]) / np.where(fresh, passed, 1.0)
-        share = np.where(fresh, -np.expm1(-np.maximum(passed, 0.0) / RATE_FILTER), 0.0)
-        rate = memory[..., RATE] + share * (slope - memory[..., RATE])
-        rate = np.where(begun, rate, -seen.reference_velocity)
-        measured = seen.velocity_age >= 0.0
-        seen.velocity_error = np.where(measured, seen.velocity - seen.reference_velocity, rate)
-        command = seen.thruster_command * seen.thruster_limit
-        target = np.where(np.abs(command) >= self.nominal.thruster_dead_band, command, 0.0)
-        lag = self.nominal.thruster_time_constant
-        way = 1.0 if lag == 0.0 else -math.expm1(-self.period / lag)
-        forces = memory[..., FORCES]
-        seen.thruster_forces = forces + way * (target - forces)
-        seen.wrench = (seen.allocation @ seen.thruster_forces[..., np.newaxis])[..., 0]
-        state = [seen.position_error, seen.heading_error, seen.velocity_error, seen.heading_rate]
-        seen.state = np.concatenate([*state, *([seen.wrench] if lag > 0.0 else [])], axis=-1)
-        kept = (np.ones_like(begun, float), seen.position_age, seen.position_error, rate)
-        return np.concatenate([*kept, seen.thruster_forces], axis=-1)
