@@ -38,8 +38,8 @@ def test_every_tier_has_gains() -> None:
     assert set(FOLDERS.values()) == {folder or "." for folder in gains.FOLDERS.values()}
 
 
-# Their episodes take up to ten times as long as others, in space too long for the search of "field":
-# they have that of the other tiers.
+# Laws whose episodes take up to ten times as long as others: in space, the search of "field" is too
+# long for them, and they have that of the other tiers.
 SLOW = {"adaptive", "informed", "mpc"}
 
 
