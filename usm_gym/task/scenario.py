@@ -243,12 +243,6 @@ def times_faster(frequency: float | None, factor: float) -> float | None:
     return None if frequency is None else factor * frequency
 
 
-def mode_of(value: Any) -> Mode:
-    """The mode of a name.
-
-    Raises:
-        ValueError: If there is no such mode.
-    """
-    require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
-    mode: Mode = value
-    return mode
+def require_mode(value: Any, modes: tuple[str, ...]) -> None:
+    """Raise a `ValueError` that names the modes unless a value is the name of one of them."""
+    require(isinstance(value, str) and value in modes, "mode", value, " or ".join(modes))
