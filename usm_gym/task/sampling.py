@@ -148,8 +148,7 @@ def named(
     )
     gap_range = nominal.conditions.shift_gap_range
     if name == "nominal" and gap_range is not None:
-        gap = sum(gap_range) / 2
-        times = tuple(np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS].tolist())
+        times = even_times(gap_range)
         sides = tuple(0.98 * (-1.0) ** k for k in range(len(times)))
         scan = Inspection(bending_joints=bending_joints, times=times, deflections=sides)
         return dataclasses.replace(
@@ -169,6 +168,12 @@ def named(
         joint_stiffness=9000.0,
         joint_damping=150.0,
     )
+
+
+def even_times(gap_range: tuple[float, float]) -> tuple[float, ...]:
+    """When the joints shift in a nominal scan, s: one mean gap after the other to the end."""
+    gap = sum(gap_range) / 2
+    return tuple(np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS].tolist())
 
 
 def most_bending(joints: int) -> int:

@@ -12,7 +12,7 @@ from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robots import EELY, spatial_robot_of
 from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.task.conditions import SPATIAL_PRESETS, Conditions
-from usm_gym.task.sampling import SCAN_DURATION, SCAN_SETTLE_TIME
+from usm_gym.task.sampling import SCAN_DURATION, SCAN_SETTLE_TIME, even_times
 from usm_gym.task.scenario import require_mode
 from usm_gym.task.spatial_scenario import (
     NO_SCAN,
@@ -159,12 +159,11 @@ def nominal_in_space(
     if recipe.scanning:
         scan = dataclasses.replace(Scan(), bending_joints=bending)
     if recipe.scanning and conditions.shift_gap_range is not None:
-        gap = sum(conditions.shift_gap_range) / 2
-        times = np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS]
+        times = even_times(conditions.shift_gap_range)
         sides = (-1.0) ** np.arange(len(times))
         scan = Scan(
             bending_joints=bending,
-            times=tuple(times.tolist()),
+            times=times,
             pans=tuple((0.8 * sides).tolist()),
             tilts=tuple((0.4 * sides).tolist()),
         )
