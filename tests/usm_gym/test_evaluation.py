@@ -1,7 +1,6 @@
 """The one evaluation loop scores what really happens, the same however the work is done."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -83,19 +82,6 @@ class Still:
         return np.tile(self.action, (len(observation), 1)), state
 
 
-class Spoiled(Still):
-    """An action that goes wrong in the third step."""
-
-    def __init__(self, spoil: Callable[[Any], Any]) -> None:
-        super().__init__()
-        self.spoil = spoil
-
-    def predict(self, observation: Any, state: Any = None, *_: Any, **__: Any) -> Any:
-        action = np.zeros((len(observation), 5), np.float32)
-        step = 0 if state is None else state
-        return (self.spoil(action) if step == 2 else action), step + 1
-
-
 def test_workers_do_not_matter() -> None:
     assert_same(usm_gym.evaluate(policy(), mixed(), workers=2), scored())
 
@@ -166,17 +152,6 @@ def test_control_periods_may_differ_where_the_policy_knows_of_none() -> None:
     assert both.per_episode["rms_error_x"][0] != both.per_episode["rms_error_x"][1]
     with pytest.raises(ValueError, match="control_period"):
         usm_gym.evaluate(policy(), [slow, fast])
-
-
-def test_an_episode_that_leaves_nothing_to_score_is_refused_at_once() -> None:
-    class Unreachable(Still):
-        def predict(self, *_: Any, **__: Any) -> Any:
-            raise AssertionError("the episode was begun")
-
-    scenario = short("operation", "field", 0)
-    everything = replace(scenario.inspection, times=(0.4,))
-    with pytest.raises(ValueError, match="shifts"):
-        usm_gym.evaluate(Unreachable(), [scenario, replace(scenario, inspection=everything)])
 
 
 def test_the_scores_are_all_different_numbers() -> None:
@@ -327,24 +302,6 @@ def test_nothing_is_scored_after_a_loss() -> None:
     assert np.abs(trajectory.error[:-1]).max() <= 0.5
 
 
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda action: action * np.nan,
-        lambda action: np.where(np.arange(5) == 3, np.nan, action),
-        lambda action: action[:, :4],
-        lambda action: action[0],
-        lambda action: action[:1],
-        lambda action: np.concatenate([action, action]),
-        lambda action: None,
-        lambda action: "ahead",
-    ],
-)
-def test_what_is_no_action_is_refused(spoil: Callable[[Any], Any]) -> None:
-    with pytest.raises(ValueError, match=r"action|convert"):
-        usm_gym.evaluate(Spoiled(spoil), mixed()[:3:2])
-
-
 def test_actions_beyond_the_bounds_saturate() -> None:
     scenarios = [short("operation", "field", 0, 2.0)]
     result = usm_gym.evaluate(Still([1.0, -1.0, 1.0, -1.0, 1.0]), scenarios)
@@ -352,21 +309,6 @@ def test_actions_beyond_the_bounds_saturate() -> None:
     assert result.per_episode["saturation_share"][0] == 1.0
     assert result.per_episode["thrust_effort"][0] == 20.0
     assert result.per_episode["thrust_variation"][0] == 0.0
-
-
-@pytest.mark.parametrize("given", [Still, "sta", None])
-def test_what_does_not_act_is_refused(given: Any) -> None:
-    with pytest.raises(ValueError, match=r"policy is .*`predict`"):
-        usm_gym.evaluate(given, mixed()[:1])
-
-
-@pytest.mark.parametrize(
-    ("scenarios", "options", "named"),
-    [([], {}, "scenarios"), (mixed()[:1], {"workers": 0}, "workers")],
-)
-def test_bad_arguments_are_named(scenarios: Any, options: Any, named: str) -> None:
-    with pytest.raises(ValueError, match=named):
-        usm_gym.evaluate(Still(), scenarios, **options)
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -32,12 +32,15 @@ class TrackingEnv(gym.Env[Observation, NDArray[np.float32]]):
         layout: Table of the observation.
     """
 
-    def __init__(self, sampler: Sampler, viewer: Viewer | None = None) -> None:
+    def __init__(self, sampler: Sampler, render_mode: str | None = None) -> None:
         """Make the environment; no random number is drawn before `reset`.
 
         Args:
             sampler: Where the scenarios come from.
-            viewer: What draws the robot; without one, nothing is drawn.
+            render_mode: "rgb_array" or "human"; None draws nothing.
+
+        Raises:
+            ValueError: If the render mode is not allowed.
         """
         self.sampler = sampler
         self.world = world_of(sampler.body)
@@ -45,8 +48,8 @@ class TrackingEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.observation_space = self.layout.space
         self.action_space = action_space(self.world)
         self.metadata = {**self.metadata, "render_fps": render_fps(sampler.conditions)}
-        self.render_mode = None if viewer is None else viewer.mode
-        self._viewer = viewer
+        self.render_mode = render_mode
+        self._viewer = None if render_mode is None else Viewer(sampler.body, render_mode)
         self._simulation: Simulation | None = None
         self._over = False
 

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.vector import AutoresetMode
 
-from usm_gym.envs.env import TrackingEnv
-from usm_gym.envs.vector_env import TrackingVectorEnv, checked_number
-from usm_gym.rendering.viewer import RENDER_MODES, Viewer
-from usm_gym.robot import Robot
-from usm_gym.robots import robot_of
-from usm_gym.support.validation import is_whole, require
-from usm_gym.task.conditions import Conditions, conditions_of
+from usm_gym.envs.mode_env import ModeEnv, ModeVectorEnv
 from usm_gym.task.observation import ObservationLayout
-from usm_gym.task.sampling import ModeSampler
-from usm_gym.task.scenario import Mode, mode_of
+from usm_gym.task.scenario import MODES
 
 
-class USMEnv(TrackingEnv):
+class USMEnv(ModeEnv):
     """An underwater swimming manipulator whose centre of mass has to follow a path.
 
     Sixteen links, five thrusters. The thrusters hold the centre of mass on a slow path; in
@@ -97,25 +88,7 @@ window shows every step in real time (drawing needs the extra `render`) |
       second order, and the observation has a measured velocity and the ages of measurements.
     """
 
-    # One frame per control period; an instance corrects the rate if it has another period.
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 (Gymnasium's)
-
-    def __init__(
-        self,
-        mode: Mode,
-        conditions: str | Mapping[str, Any] | Conditions = "field",
-        robot: str | Mapping[str, Any] | Robot | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        """Make the environment; no random number is drawn before `reset`.
-
-        Raises:
-            ValueError: If a condition, a field of the robot or the render mode is not allowed.
-        """
-        self.mode: Mode = mode_of(mode)
-        self.conditions, self.robot = conditions_of(conditions), robot_of(robot)
-        viewer = None if render_mode is None else Viewer(self.robot, render_mode)
-        super().__init__(ModeSampler(self.mode, self.conditions, self.robot), viewer)
+    modes = MODES
 
 
 # The class docstring is the specification; its table comes from the one that the code uses.
@@ -125,7 +98,7 @@ USMEnv.__doc__ = (USMEnv.__doc__ or "").replace(
 
 
 # Some clients, skrl for one, recognise a vector environment by its direct bases.
-class USMVectorEnv(TrackingVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
+class USMVectorEnv(ModeVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
     """`num_envs` underwater swimming manipulators, each as in `USMEnv`, with the same bits.
 
     Made by `gym.make_vec("usm_gym:USM-Operation-v0", num_envs=256,
@@ -138,42 +111,4 @@ class USMVectorEnv(TrackingVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
     default), "SameStep" with `final_obs` and `final_info`, and "Disabled".
     """
 
-    metadata = {"render_modes": list(RENDER_MODES)}  # noqa: RUF012 (Gymnasium's)
-
-    def __init__(
-        self,
-        num_envs: int,
-        mode: Mode,
-        conditions: str | Mapping[str, Any] | Conditions = "field",
-        robot: str | Mapping[str, Any] | Robot | None = None,
-        render_mode: str | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        threads: int = 1,
-        render_index: int = 0,
-    ) -> None:
-        """Make the environment.
-
-        Args:
-            num_envs: How many robots.
-            mode: "operation" or "torpedo".
-            conditions: As of `USMEnv`.
-            robot: As of `USMEnv`.
-            render_mode: As of `USMEnv`: "rgb_array" gives images of all robots, "human" shows one
-                robot in a window.
-            autoreset_mode: What happens to a robot whose episode has ended.
-            threads: How many threads share a step, at most one per core; without effect on its
-                result.
-            render_index: Which robot the window shows.
-
-        Raises:
-            ValueError: If an argument is not allowed.
-        """
-        last = checked_number(num_envs) - 1
-        require(is_whole(render_index, 0, last), "render_index", render_index, f"0 to {last}")
-        self.mode: Mode = mode_of(mode)
-        self.conditions, self.robot = conditions_of(conditions), robot_of(robot)
-        viewer = None
-        if render_mode is not None:
-            viewer = Viewer(self.robot, render_mode, num_envs, render_index)
-        sampler = ModeSampler(self.mode, self.conditions, self.robot)
-        super().__init__(num_envs, sampler, autoreset_mode, threads, viewer)
+    modes = MODES

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.vector import AutoresetMode
 
-from usm_gym.envs.env import TrackingEnv
-from usm_gym.envs.vector_env import TrackingVectorEnv, checked_number
-from usm_gym.rendering.viewer import RENDER_MODES, Viewer
-from usm_gym.robots import spatial_robot_of
-from usm_gym.spatial_robot import SpatialRobot
-from usm_gym.support.validation import is_whole, require
-from usm_gym.task.conditions import SPATIAL_PRESETS, Conditions, conditions_of
+from usm_gym.envs.mode_env import ModeEnv, ModeVectorEnv
 from usm_gym.task.spatial_observation import SpatialLayout
-from usm_gym.task.spatial_sampling import SpatialSampler, spatial_mode_of
-from usm_gym.task.spatial_scenario import SpatialMode
+from usm_gym.task.spatial_scenario import SPATIAL_MODES
 
 
-class USM3DEnv(TrackingEnv):
+class USM3DEnv(ModeEnv):
     """An underwater swimming manipulator in space whose centre of mass has to follow a path.
 
     The robot is "Eely": nine cylinders, 3.37 m and 86 kg, eight joints in turn about z (pan) and y
@@ -106,26 +97,7 @@ window shows every step in real time (drawing needs the extra `render`) |
     - v0: first version.
     """
 
-    # One frame per control period; an instance corrects the rate if it has another period.
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012 (Gymnasium's)
-
-    def __init__(
-        self,
-        mode: SpatialMode,
-        conditions: str | Mapping[str, Any] | Conditions = "field",
-        robot: str | Mapping[str, Any] | SpatialRobot | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        """Make the environment; no random number is drawn before `reset`.
-
-        Raises:
-            ValueError: If a condition, a field of the robot or the render mode is not allowed.
-        """
-        self.mode: SpatialMode = spatial_mode_of(mode)
-        self.conditions = conditions_of(conditions, SPATIAL_PRESETS)
-        self.robot = spatial_robot_of(robot)
-        viewer = None if render_mode is None else Viewer(self.robot, render_mode)
-        super().__init__(SpatialSampler(self.mode, self.conditions, self.robot), viewer)
+    modes = SPATIAL_MODES
 
 
 # The class docstring is the specification; its table comes from the one that the code uses.
@@ -135,7 +107,7 @@ USM3DEnv.__doc__ = (USM3DEnv.__doc__ or "").replace(
 
 
 # Some clients, skrl for one, recognise a vector environment by its direct bases.
-class USM3DVectorEnv(TrackingVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
+class USM3DVectorEnv(ModeVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
     """`num_envs` underwater swimming manipulators in space, as in `USM3DEnv`, with the same bits.
 
     Made by `gym.make_vec("usm_gym:USM-Operation3D-v0", num_envs=256,
@@ -143,43 +115,4 @@ class USM3DVectorEnv(TrackingVectorEnv, gym.vector.VectorEnv[Any, Any, Any]):
     `usm_gym.envs.usm.USMVectorEnv`.
     """
 
-    metadata = {"render_modes": list(RENDER_MODES)}  # noqa: RUF012 (Gymnasium's)
-
-    def __init__(
-        self,
-        num_envs: int,
-        mode: SpatialMode,
-        conditions: str | Mapping[str, Any] | Conditions = "field",
-        robot: str | Mapping[str, Any] | SpatialRobot | None = None,
-        render_mode: str | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        threads: int = 1,
-        render_index: int = 0,
-    ) -> None:
-        """Make the environment.
-
-        Args:
-            num_envs: How many robots.
-            mode: "operation3d" or "torpedo3d".
-            conditions: As of `USM3DEnv`.
-            robot: As of `USM3DEnv`.
-            render_mode: As of `USM3DEnv`: "rgb_array" gives images of all robots, "human" shows one
-                robot in a window.
-            autoreset_mode: What happens to a robot whose episode has ended.
-            threads: How many threads share a step, at most one per core; without effect on its
-                result.
-            render_index: Which robot the window shows.
-
-        Raises:
-            ValueError: If an argument is not allowed.
-        """
-        last = checked_number(num_envs) - 1
-        require(is_whole(render_index, 0, last), "render_index", render_index, f"0 to {last}")
-        self.mode: SpatialMode = spatial_mode_of(mode)
-        self.conditions = conditions_of(conditions, SPATIAL_PRESETS)
-        self.robot = spatial_robot_of(robot)
-        sampler = SpatialSampler(self.mode, self.conditions, self.robot)
-        viewer = None
-        if render_mode is not None:
-            viewer = Viewer(self.robot, render_mode, num_envs, render_index)
-        super().__init__(num_envs, sampler, autoreset_mode, threads, viewer)
+    modes = SPATIAL_MODES

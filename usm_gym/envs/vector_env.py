@@ -71,7 +71,8 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
         sampler: Sampler,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
-        viewer: Viewer | None = None,
+        render_mode: str | None = None,
+        render_index: int = 0,
     ) -> None:
         """Make the environment.
 
@@ -81,12 +82,17 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
             autoreset_mode: What happens to a robot whose episode has ended.
             threads: How many threads share a step, at most one per core; without effect on its
                 result.
-            viewer: What draws the robots; without one, nothing is drawn.
+            render_mode: "rgb_array" gives images of all robots, "human" shows one robot in a
+                window; None draws nothing.
+            render_index: Which robot the window shows.
 
         Raises:
             ValueError: If an argument is not allowed.
         """
-        checked_number(num_envs)
+        allowed = f"1 to {MOST_ROBOTS}"
+        require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)
+        last = num_envs - 1
+        require(is_whole(render_index, 0, last), "render_index", render_index, f"0 to {last}")
         require(is_whole(threads, 1), "threads", threads, "1 or more")
         modes = [mode.value for mode in AutoresetMode]
         known = isinstance(autoreset_mode, AutoresetMode) or autoreset_mode in modes
@@ -102,8 +108,9 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
             "render_fps": render_fps(sampler.conditions),
             "autoreset_mode": self.autoreset_mode,
         }
-        self.render_mode = None if viewer is None else viewer.mode
-        self._viewer = viewer
+        self.render_mode = render_mode
+        if render_mode is not None:
+            self._viewer = Viewer(sampler.body, render_mode, num_envs, render_index)
         self.single_observation_space = self.layout.space
         self.single_action_space = action_space(self.world)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -321,14 +328,3 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
             "final_info": self._infos(done),
             "_final_info": done,
         }
-
-
-def checked_number(num_envs: Any) -> int:
-    """A number of robots.
-
-    Raises:
-        ValueError: If it is not a positive integer, or too large.
-    """
-    allowed = f"1 to {MOST_ROBOTS}"
-    require(is_whole(num_envs, 1, MOST_ROBOTS), "num_envs", num_envs, allowed)
-    return int(num_envs)

@@ -10,9 +10,9 @@ import numpy as np
 from usm_gym.robots import EELY, PAPER
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS, Conditions
-from usm_gym.task.sampling import sample
-from usm_gym.task.scenario import MODES, Mode, Scenario
-from usm_gym.task.spatial_sampling import sample_in_space
+from usm_gym.task.sampling import named, sample
+from usm_gym.task.scenario import MODES, Mode, Scenario, require_mode
+from usm_gym.task.spatial_sampling import nominal_in_space, sample_in_space
 from usm_gym.task.spatial_scenario import SPATIAL_MODES, SpatialMode, SpatialScenario
 
 AnyMode = Mode | SpatialMode
@@ -44,10 +44,22 @@ def sample_of(
     Raises:
         ValueError: If there is no such mode.
     """
-    require(mode in ALL_MODES, "mode", mode, " or ".join(ALL_MODES))
+    require_mode(mode, ALL_MODES)
     if in_space(mode):
         return sample_in_space(mode, conditions, stream, robot or EELY)  # type: ignore[arg-type]
     return sample(mode, conditions, stream, robot or PAPER)  # type: ignore[arg-type]
+
+
+def named_of(name: str, mode: AnyMode, conditions: Conditions, robot: Any) -> AnyScenario:
+    """The scenario of a name: "nominal", which all modes have, or "table1", which is of the plane.
+
+    Raises:
+        ValueError: If there is none of that name.
+    """
+    if in_space(mode):
+        require(name == "nominal", "scenario", name, "nominal")
+        return nominal_in_space(mode, conditions, robot)  # type: ignore[arg-type]
+    return named(name, mode, conditions, robot)  # type: ignore[arg-type]
 
 
 def read_scenario(data: Mapping[str, Any]) -> AnyScenario:

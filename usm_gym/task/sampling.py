@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robot import Robot
-from usm_gym.robots import PAPER, name_of, robot_of
+from usm_gym.robots import PAPER, robot_of
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import FIELD, PRESETS, Conditions
-from usm_gym.task.nominal import Nominal
-from usm_gym.task.scenario import STILL, Inspection, Mode, Path, Scenario, mode_of
+from usm_gym.task.scenario import MODES, STILL, Inspection, Mode, Path, Scenario, require_mode
 
 # Length of a scan, s, and from when on its errors count: an adaptive law has seen some shifts.
 SCAN_DURATION, SCAN_SETTLE_TIME = 60.0, 20.0
@@ -98,46 +95,6 @@ RECIPES: dict[Mode, Recipe] = {
 }
 
 
-@dataclass(frozen=True)
-class ModeSampler:
-    """Scenarios of a mode, under given conditions, for a given robot.
-
-    Attributes:
-        mode: "operation" or "torpedo".
-        conditions: Their conditions.
-        body: The robot.
-    """
-
-    mode: Mode
-    conditions: Conditions
-    body: Robot
-
-    @property
-    def nominal(self) -> Nominal:
-        """What a controller may know before the first scenario."""
-        return self.choose("nominal").nominal
-
-    def draw(self, stream: np.random.Generator) -> Scenario:
-        """Draw a scenario."""
-        return sample(self.mode, self.conditions, stream, name_of(self.body))
-
-    def choose(self, wanted: str | Mapping[str, Any] | Scenario) -> Scenario:
-        """The scenario of a name, of a dict, or itself; a dict without robot has this one.
-
-        Raises:
-            ValueError: If there is none, or it is of another robot or mode.
-        """
-        if isinstance(wanted, str):
-            return named(wanted, self.mode, self.conditions, name_of(self.body))
-        if not isinstance(wanted, Scenario):
-            known = {"robot": name_of(self.body)}
-            wanted = Scenario.from_dict(known | wanted if isinstance(wanted, dict) else wanted)
-        require(wanted.mode == self.mode, "the scenario's mode", wanted.mode, repr(self.mode))
-        allowed = f"the environment's, {name_of(self.body)}"
-        require(wanted.body == self.body, "the scenario's robot", wanted.robot, allowed)
-        return wanted
-
-
 def sample(
     mode: Mode,
     conditions: Conditions,
@@ -152,7 +109,8 @@ def sample(
         stream: Where all randomness comes from.
         robot: The robot, or its name.
     """
-    recipe, joints = RECIPES[mode_of(mode)], robot_of(robot).links - 1
+    require_mode(mode, MODES)
+    recipe, joints = RECIPES[mode], robot_of(robot).links - 1
     path = recipe.draw_path(stream)
     inspection = recipe.draw_motion(conditions, joints, stream)
     noise_seed = int(stream.integers(2**63))
@@ -177,7 +135,8 @@ def named(
         robot: The robot, or its name; eleven fifteenths of its joints bend.
     """
     require(name in ("nominal", "table1"), "scenario", name, "nominal, table1")
-    recipe = RECIPES[mode_of(mode)]
+    require_mode(mode, MODES)
+    recipe = RECIPES[mode]
     bending_joints = most_bending(robot_of(robot).links - 1)
     nominal = Scenario(
         mode=mode,
@@ -189,8 +148,7 @@ def named(
     )
     gap_range = nominal.conditions.shift_gap_range
     if name == "nominal" and gap_range is not None:
-        gap = sum(gap_range) / 2
-        times = tuple(np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS].tolist())
+        times = even_times(gap_range)
         sides = tuple(0.98 * (-1.0) ** k for k in range(len(times)))
         scan = Inspection(bending_joints=bending_joints, times=times, deflections=sides)
         return dataclasses.replace(
@@ -210,6 +168,12 @@ def named(
         joint_stiffness=9000.0,
         joint_damping=150.0,
     )
+
+
+def even_times(gap_range: tuple[float, float]) -> tuple[float, ...]:
+    """When the joints shift in a nominal scan, s: one mean gap after the other to the end."""
+    gap = sum(gap_range) / 2
+    return tuple(np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS].tolist())
 
 
 def most_bending(joints: int) -> int:

@@ -7,31 +7,31 @@ same in JSON (`to_dict`, `from_dict`).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
-from pydantic import Field, Strict, TypeAdapter
+from pydantic import Field
 
 from usm_gym.plant.references import MAX_SHIFTS
 from usm_gym.robot import Damping, Robot, Stiffness
 from usm_gym.robots import PAPER, robot_of
-from usm_gym.support.validation import Count, Number, Switch, build, require, validated
-from usm_gym.task.conditions import (
-    FIELD,
-    Coefficient,
-    Conditions,
-    FilterFrequency,
-    require_whole_steps,
+from usm_gym.support.validation import Count, Number, Switch, require, validated
+from usm_gym.task.base_scenario import (
+    BaseScenario,
+    Duration,
+    LookAhead,
+    Seed,
+    Time,
+    require_rising,
 )
+from usm_gym.task.conditions import FIELD, Coefficient, Conditions, FilterFrequency
 from usm_gym.task.guidance import path_positions
 from usm_gym.task.nominal import Nominal, nominal_under
 from usm_gym.task.sensing import Sensing, sensing
-from usm_gym.task.water import Water, draw_water
+from usm_gym.task.water import Water
 
 Mode = Literal["operation", "torpedo"]
 MODES: tuple[Mode, ...] = get_args(Mode)
-Time = Annotated[Number, Field(ge=0, le=3600)]
 
 
 @validated
@@ -79,15 +79,14 @@ class Inspection:
             self.deflections,
             "as many as times",
         )
-        rising = all(a < b for a, b in zip(self.times, self.times[1:], strict=False))
-        require(rising, "times", self.times, "rising times")
+        require_rising(self.times)
 
 
 STILL = Inspection(bending_joints=1, times=(), deflections=())
 
 
 @validated
-class Scenario:
+class Scenario(BaseScenario):
     """One episode, complete.
 
     Attributes:
@@ -113,34 +112,22 @@ class Scenario:
             itself, so that a file of scenarios is complete.
     """
 
+    usual: ClassVar[str] = PAPER
     mode: Mode = "operation"
     path: Path = Path()
     inspection: Inspection = Inspection()
     conditions: Conditions = FIELD
     water: Water = Water()
     thruster_gains: tuple[Coefficient, ...] = ()
-    duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0
+    duration: Duration = 40.0
     settle_time: Time = 5.0
-    noise_seed: Annotated[int, Strict(), Field(ge=0, lt=2**64)] = 0
+    noise_seed: Seed = 0
     joint_stiffness: Stiffness | None = None
     joint_damping: Damping | None = None
     heading: Literal["mean", "head"] = "mean"
-    look_ahead: Annotated[Number, Field(ge=0.01, le=1000)] | None = None
+    look_ahead: LookAhead | None = None
     cross_track: Switch = False
     robot: str | Robot = PAPER
-
-    def __post_init__(self) -> None:
-        """Refuse a duration of no whole number of control periods or too many steps, and names."""
-        if self.robot != PAPER:
-            # Another process need not know a name that was given here.
-            body = robot_of(self.robot)
-            object.__setattr__(self, "robot", PAPER if body == robot_of(PAPER) else body)
-        require_whole_steps(self.duration, self.conditions)
-
-    @property
-    def steps(self) -> int:
-        """Control periods in the episode."""
-        return round(self.duration / self.conditions.control_period)
 
     @property
     def body(self) -> Robot:
@@ -209,27 +196,8 @@ class Scenario:
     def under(self, conditions: Conditions) -> Scenario:
         """The same episode under other conditions; water and gains are redrawn from its seed."""
         body = self.body
-        water, gains = draw_water(conditions, self.noise_seed, body.links, len(body.thrusters))
+        water, gains = Water.draw(conditions, self.noise_seed, body.links, len(body.thrusters))
         return dataclasses.replace(self, conditions=conditions, water=water, thruster_gains=gains)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The scenario in JSON's types; the paper's robot goes without saying."""
-        data: dict[str, Any] = _ADAPTER.dump_python(self, mode="json")
-        if data["robot"] == PAPER:
-            del data["robot"]
-        return data
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> Scenario:
-        """Read what `to_dict` wrote; fields left out have their defaults.
-
-        Raises:
-            ValueError: If a key is unknown, or a value of the wrong type or out of range.
-        """
-        return build(_ADAPTER, "scenario", data)
-
-
-_ADAPTER = TypeAdapter(Scenario)
 
 
 def times_faster(frequency: float | None, factor: float) -> float | None:
@@ -243,12 +211,6 @@ def times_faster(frequency: float | None, factor: float) -> float | None:
     return None if frequency is None else factor * frequency
 
 
-def mode_of(value: Any) -> Mode:
-    """The mode of a name.
-
-    Raises:
-        ValueError: If there is no such mode.
-    """
-    require(isinstance(value, str) and value in MODES, "mode", value, " or ".join(MODES))
-    mode: Mode = value
-    return mode
+def require_mode(value: Any, modes: tuple[str, ...]) -> None:
+    """Raise a `ValueError` that names the modes unless a value is the name of one of them."""
+    require(isinstance(value, str) and value in modes, "mode", value, " or ".join(modes))

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from usm_gym.plant.references import MAX_SHIFTS
-from usm_gym.robots import EELY, name_of, spatial_robot_of
+from usm_gym.robots import EELY, spatial_robot_of
 from usm_gym.spatial_robot import SpatialRobot
-from usm_gym.support.validation import require
 from usm_gym.task.conditions import SPATIAL_PRESETS, Conditions
-from usm_gym.task.nominal import Nominal
-from usm_gym.task.sampling import SCAN_DURATION, SCAN_SETTLE_TIME
+from usm_gym.task.sampling import SCAN_DURATION, SCAN_SETTLE_TIME, even_times
+from usm_gym.task.scenario import require_mode
 from usm_gym.task.spatial_scenario import (
     NO_SCAN,
     SPATIAL_MODES,
@@ -120,54 +118,6 @@ SPATIAL_RECIPES: dict[SpatialMode, SpatialRecipe] = {
 }
 
 
-@dataclass(frozen=True)
-class SpatialSampler:
-    """Scenarios of a mode in space, under given conditions, for a given robot.
-
-    Attributes:
-        mode: "operation3d" or "torpedo3d".
-        conditions: Their conditions.
-        body: The robot.
-    """
-
-    mode: SpatialMode
-    conditions: Conditions
-    body: SpatialRobot
-
-    @property
-    def nominal(self) -> Nominal:
-        """What a controller may know before the first scenario."""
-        return self.choose("nominal").nominal
-
-    def draw(self, stream: np.random.Generator) -> SpatialScenario:
-        """Draw a scenario."""
-        return sample_in_space(self.mode, self.conditions, stream, name_of(self.body))
-
-    def choose(self, wanted: str | Mapping[str, Any] | SpatialScenario) -> SpatialScenario:
-        """The scenario "nominal", that of a dict, or itself; a dict without robot has this one.
-
-        Raises:
-            ValueError: If there is none, or it is of another robot or mode.
-        """
-        robot = name_of(self.body)
-        if isinstance(wanted, str):
-            require(wanted == "nominal", "scenario", wanted, "nominal")
-            return nominal_in_space(self.mode, self.conditions, robot)
-        if not isinstance(wanted, SpatialScenario):
-            known = {"mode": self.mode, "robot": robot}
-            wanted = SpatialScenario.from_dict(
-                known | wanted if isinstance(wanted, dict) else wanted
-            )
-        require(wanted.mode == self.mode, "the scenario's mode", wanted.mode, repr(self.mode))
-        require(
-            wanted.body == self.body,
-            "the scenario's robot",
-            wanted.robot,
-            f"the environment's, {robot}",
-        )
-        return wanted
-
-
 def sample_in_space(
     mode: SpatialMode,
     conditions: Conditions,
@@ -201,19 +151,19 @@ def nominal_in_space(
     Raises:
         ValueError: If there is no such mode.
     """
-    recipe = SPATIAL_RECIPES[spatial_mode_of(mode)]
+    require_mode(mode, SPATIAL_MODES)
+    recipe = SPATIAL_RECIPES[mode]
     body = spatial_robot_of(robot)
     scan, bending = NO_SCAN, _bending(body)
     scanning = conditions.shift_gap_range is not None
     if recipe.scanning:
         scan = dataclasses.replace(Scan(), bending_joints=bending)
     if recipe.scanning and conditions.shift_gap_range is not None:
-        gap = sum(conditions.shift_gap_range) / 2
-        times = np.arange(gap, SCAN_DURATION - gap / 2, gap)[:MAX_SHIFTS]
+        times = even_times(conditions.shift_gap_range)
         sides = (-1.0) ** np.arange(len(times))
         scan = Scan(
             bending_joints=bending,
-            times=tuple(times.tolist()),
+            times=times,
             pans=tuple((0.8 * sides).tolist()),
             tilts=tuple((0.4 * sides).tolist()),
         )
@@ -227,18 +177,6 @@ def nominal_in_space(
         look_ahead=float(body.lengths.sum()) if recipe.look_ahead else None,
         robot=robot,
     )
-
-
-def spatial_mode_of(value: Any) -> SpatialMode:
-    """The mode in space of a name.
-
-    Raises:
-        ValueError: If there is no such mode.
-    """
-    valid = isinstance(value, str) and value in SPATIAL_MODES
-    require(valid, "mode", value, " or ".join(SPATIAL_MODES))
-    mode: SpatialMode = value
-    return mode
 
 
 def _bending(robot: SpatialRobot) -> int:

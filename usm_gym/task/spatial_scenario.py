@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, Strict, TypeAdapter
+from pydantic import BeforeValidator, Field
 
 from usm_gym.plant.references import MAX_SHIFTS
-from usm_gym.robots import EELY, name_of, spatial_robot_of
+from usm_gym.robots import EELY, spatial_robot_of
 from usm_gym.spatial_robot import MOST_LINKS, SpatialRobot
-from usm_gym.support.validation import Count, Number, Switch, build, require, validated
-from usm_gym.task.conditions import (
-    SPATIAL_PRESETS,
-    Coefficient,
-    Conditions,
-    FilterFrequency,
-    require_whole_steps,
+from usm_gym.support.validation import Count, Number, Switch, require, validated
+from usm_gym.task.base_scenario import (
+    BaseScenario,
+    Duration,
+    LookAhead,
+    Seed,
+    Time,
+    require_rising,
 )
+from usm_gym.task.conditions import SPATIAL_PRESETS, Coefficient, Conditions, FilterFrequency
 from usm_gym.task.nominal import Nominal, nominal_under
 from usm_gym.task.scenario import times_faster
 from usm_gym.task.sensing import Sensing, sensing
 from usm_gym.task.spatial_guidance import space_positions
-from usm_gym.task.spatial_water import SpatialWater, draw_spatial_water
+from usm_gym.task.spatial_water import SpatialWater
 
 SpatialMode = Literal["operation3d", "torpedo3d"]
 SPATIAL_MODES: tuple[SpatialMode, ...] = get_args(SpatialMode)
 AXES = 3
 
-Time = Annotated[Number, Field(ge=0, le=3600)]
 Amplitude = Annotated[Number, Field(ge=-100, le=100)]
 Angle = Annotated[Number, Field(ge=-100, le=100)]
 Angles = tuple[Angle, ...]
@@ -97,8 +97,7 @@ class Scan:
         for name in ("pans", "tilts"):
             angles = getattr(self, name)
             require(len(angles) == len(self.times), name, angles, "as many as times")
-        rising = all(a < b for a, b in zip(self.times, self.times[1:], strict=False))
-        require(rising, "times", self.times, "rising times")
+        require_rising(self.times)
 
     def shares(self, robot: SpatialRobot) -> NDArray[np.float64]:
         """Which part of the pan and of the tilt is the reference of each joint, (2, joints)."""
@@ -112,7 +111,7 @@ NO_SCAN = Scan(bending_joints=1, times=(), pans=(), tilts=())
 
 
 @validated
-class SpatialScenario:
+class SpatialScenario(BaseScenario):
     """One episode in space, complete.
 
     Attributes:
@@ -135,31 +134,19 @@ class SpatialScenario:
             so that a file of scenarios is complete.
     """
 
+    usual: ClassVar[str] = EELY
     mode: SpatialMode = "operation3d"
     path: SpatialPath = SpatialPath()
     scan: Scan = Scan()
     conditions: SpatialConditions = SPATIAL_PRESETS["field"]
     water: SpatialWater = SpatialWater()
     thruster_gains: tuple[Coefficient, ...] = ()
-    duration: Annotated[Number, Field(ge=1e-6, le=3600)] = 40.0
+    duration: Duration = 40.0
     settle_time: Time = 5.0
-    noise_seed: Annotated[int, Strict(), Field(ge=0, lt=2**64)] = 0
-    look_ahead: Annotated[Number, Field(ge=0.01, le=1000)] | None = None
+    noise_seed: Seed = 0
+    look_ahead: LookAhead | None = None
     cross_track: Switch = False
     robot: str | SpatialRobot = EELY
-
-    def __post_init__(self) -> None:
-        """Refuse a duration of no whole number of control periods or too many steps, and names."""
-        if self.robot != EELY:
-            # Another process need not know a name that was given here.
-            body = spatial_robot_of(self.robot)
-            object.__setattr__(self, "robot", EELY if name_of(body) == EELY else body)
-        require_whole_steps(self.duration, self.conditions)
-
-    @property
-    def steps(self) -> int:
-        """Control periods in the episode."""
-        return round(self.duration / self.conditions.control_period)
 
     @property
     def body(self) -> SpatialRobot:
@@ -218,24 +205,5 @@ class SpatialScenario:
     def under(self, conditions: Conditions) -> SpatialScenario:
         """The same episode under other conditions; water and gains are redrawn from its seed."""
         body, seed = self.body, self.noise_seed
-        water, gains = draw_spatial_water(conditions, seed, len(body.links), len(body.thrusters))
+        water, gains = SpatialWater.draw(conditions, seed, len(body.links), len(body.thrusters))
         return dataclasses.replace(self, conditions=conditions, water=water, thruster_gains=gains)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The scenario in JSON's types; Eely goes without saying."""
-        data: dict[str, Any] = _ADAPTER.dump_python(self, mode="json")
-        if data["robot"] == EELY:
-            del data["robot"]
-        return data
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> SpatialScenario:
-        """Read what `to_dict` wrote; fields left out have their defaults.
-
-        Raises:
-            ValueError: If a key is unknown, or a value of the wrong type or out of range.
-        """
-        return build(_ADAPTER, "scenario", data)
-
-
-_ADAPTER = TypeAdapter(SpatialScenario)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field
@@ -23,6 +24,86 @@ WAVES = MAX_SINUSOIDS - 1
 WAVE_PERIODS = (4.0, 10.0)
 
 
+class BaseWater(ABC):
+    """What the water of plane and space has in common: how it is drawn.
+
+    Attributes:
+        axes: Axes of its velocity.
+    """
+
+    axes: ClassVar[int]
+    amplitude: tuple[float, ...]
+    waves: tuple[Any, ...]
+
+    @property
+    def sinusoids(self) -> int:
+        """How many sinusoids the water's velocity has, waves included."""
+        return 1 + len(self.waves) if self.waves or any(self.amplitude) else 0
+
+    @staticmethod
+    @abstractmethod
+    def wave(amplitude: Any, phase: float, period: float) -> Any:
+        """A wave.
+
+        Args:
+            amplitude: Amplitude of its velocity, by axis, m/s; the water rises as far as it swings.
+            phase: Its phase at the start, rad.
+            period: Its period, s.
+        """
+
+    @classmethod
+    def draw(
+        cls, conditions: Conditions, noise_seed: int, links: int, thrusters: int
+    ) -> tuple[Self, tuple[float, ...]]:
+        """Draw the water of an episode, and what its thrusters make of a command.
+
+        Every number comes from the same place of the same stream whatever the conditions, so that
+        a change of conditions stretches an episode's water rather than replace it.
+
+        Args:
+            conditions: Conditions, whose ranges are used.
+            noise_seed: Seed of the episode.
+            links: Links of the robot.
+            thrusters: Thrusters of the robot.
+
+        Returns:
+            The water, and the gains of the thrusters, none if they are all 1.
+        """
+        stream = np.random.default_rng(np.random.SeedSequence(noise_seed, spawn_key=(WATER,)))
+        current, amplitude = stream.uniform(-1.0, 1.0, (2, cls.axes))
+        phase = stream.uniform(0.0, 2 * math.pi, cls.axes)
+        period = stream.uniform(10.0, 40.0)
+        low, high = conditions.coefficient_range
+        coefficients = low + (high - low) * stream.random(6)
+        waves = cls._draw_waves(conditions.wave_limit, stream)
+        low, high = conditions.thruster_gain_range
+        gains = low + (high - low) * stream.random(thrusters)
+        factors = 1.0 + conditions.coefficient_spread * stream.uniform(-1.0, 1.0, links)
+        fields = {
+            "current": tuple((conditions.current_limit * current).tolist()),
+            "amplitude": tuple((conditions.current_variation * amplitude).tolist()),
+            "phase": tuple(phase.tolist()),
+            "period": period,
+            "waves": waves,
+            "coefficients": tuple(coefficients.tolist()),
+            "link_factors": tuple(factors.tolist()) if conditions.coefficient_spread > 0.0 else (),
+        }
+        return cls(**fields), tuple(gains.tolist()) if (low, high) != (1.0, 1.0) else ()
+
+    @classmethod
+    def _draw_waves(cls, limit: float, stream: np.random.Generator) -> tuple[Any, ...]:
+        """Draw waves on any course whose amplitudes add up to `limit` at most, m/s."""
+        share, course, phase, period = stream.random((4, WAVES))
+        speed, course, phase = limit * share / WAVES, 2 * math.pi * course, 2 * math.pi * phase
+        period = WAVE_PERIODS[0] + (WAVE_PERIODS[1] - WAVE_PERIODS[0]) * period
+        if limit == 0.0:
+            return ()
+        along = np.stack([np.cos(course), np.sin(course), np.ones(WAVES)], axis=1)[:, : cls.axes]
+        amplitude = map(tuple, (speed[:, np.newaxis] * along).tolist())
+        waves = zip(amplitude, phase.tolist(), period.tolist(), strict=True)
+        return tuple(cls.wave(*wave) for wave in waves)
+
+
 @validated
 class Wave:
     """One sinusoid of the waves; the water moves along its direction.
@@ -39,7 +120,7 @@ class Wave:
 
 
 @validated
-class Water:
+class Water(BaseWater):
     """The water of one episode, which no controller is told.
 
     Attributes:
@@ -54,6 +135,7 @@ class Water:
             100; none: 1.
     """
 
+    axes: ClassVar[int] = 2
     current: tuple[Velocity, Velocity] = (0.0, 0.0)
     amplitude: tuple[Velocity, Velocity] = (0.0, 0.0)
     phase: tuple[Phase, Phase] = (0.0, 0.0)
@@ -64,66 +146,7 @@ class Water:
     ] = (1.0,) * 6
     link_factors: tuple[Coefficient, ...] = ()
 
-    @property
-    def sinusoids(self) -> int:
-        """How many sinusoids the water's velocity has, waves included."""
-        return 1 + len(self.waves) if self.waves or any(self.amplitude) else 0
-
-
-def draw_water(
-    conditions: Conditions, noise_seed: int, links: int, thrusters: int
-) -> tuple[Water, tuple[float, ...]]:
-    """Draw the water of an episode, and what its thrusters make of a command.
-
-    Every number comes from the same place of the same stream whatever the conditions, so that
-    a change of conditions stretches an episode's water rather than replace it.
-
-    Args:
-        conditions: Conditions, whose ranges are used.
-        noise_seed: Seed of the episode.
-        links: Links of the robot.
-        thrusters: Thrusters of the robot.
-
-    Returns:
-        The water, and the gains of the thrusters, none if they are all 1.
-    """
-    stream = np.random.default_rng(np.random.SeedSequence(noise_seed, spawn_key=(WATER,)))
-    unit = stream.uniform(-1.0, 1.0, 4)
-    phase = stream.uniform(0.0, 2 * math.pi, 2)
-    period = stream.uniform(10.0, 40.0)
-    low, high = conditions.coefficient_range
-    coefficients = low + (high - low) * stream.random(6)
-    waves = _draw_waves(conditions.wave_limit, stream)
-    low, high = conditions.thruster_gain_range
-    gains = low + (high - low) * stream.random(thrusters)
-    factors = 1.0 + conditions.coefficient_spread * stream.uniform(-1.0, 1.0, links)
-    water = Water(
-        current=_pair(conditions.current_limit * unit[:2]),
-        amplitude=_pair(conditions.current_variation * unit[2:]),
-        phase=_pair(phase),
-        period=period,
-        waves=waves,
-        coefficients=tuple(coefficients.tolist()),
-        link_factors=tuple(factors.tolist()) if conditions.coefficient_spread > 0.0 else (),
-    )
-    return water, tuple(gains.tolist()) if (low, high) != (1.0, 1.0) else ()
-
-
-def _draw_waves(limit: float, stream: np.random.Generator) -> tuple[Wave, ...]:
-    """Draw sinusoids whose amplitudes add up to `limit` at most, m/s."""
-    share, course, phase, period = stream.random((4, WAVES))
-    amplitude, course = limit * share / WAVES, 2 * math.pi * course
-    phase = 2 * math.pi * phase
-    period = WAVE_PERIODS[0] + (WAVE_PERIODS[1] - WAVE_PERIODS[0]) * period
-    if limit == 0.0:
-        return ()
-    along = np.stack([amplitude * np.cos(course), amplitude * np.sin(course)], axis=1)
-    return tuple(
-        Wave(amplitude=_pair(velocity), phase=float(at), period=float(length))
-        for velocity, at, length in zip(along, phase, period, strict=True)
-    )
-
-
-def _pair(values: Any) -> tuple[float, float]:
-    x, y = values.tolist()
-    return x, y
+    @staticmethod
+    def wave(amplitude: Any, phase: float, period: float) -> Wave:
+        """A wave, whose water moves along its course; see `BaseWater.wave`."""
+        return Wave(amplitude, phase, period)
