@@ -120,7 +120,6 @@ HEADLINES = (
     "estimator-lqg-joints-basin",
     "residual-sta-navigator-basin",
     "residual-eely",
-    "estimator-lqg-joints-eely",
 )
 FEWER = {
     "estimator-lqg-joints-sea": 3,
@@ -163,25 +162,25 @@ RIVALS: dict[str, tuple[str, ...]] = {
 }
 
 
-def _elsewhere(home: Conditions, ideal: Conditions) -> dict[str, Conditions]:
-    """Conditions that differ from those of a field in one thing each."""
-    return {
-        "ideal": ideal,
-        "still": replace(home, motion=False),
-        "exact": exact(home),
-        "coefficients": replace(home, coefficient_range=(0.6, 1.4)),
-        "delay": replace(home, position_delay=1),
-        "noise": replace(home, position_noise=1e-3),
-        "lag": replace(home, thruster_time_constant=2 * home.thruster_time_constant),
-    }
-
-
 # Where those of a tier are taken that they have not been made for.
 ELSEWHERE: dict[str, dict[str, Conditions]] = {
-    "field": _elsewhere(FIELD, PRESETS["ideal"]),
+    "field": {
+        "ideal": PRESETS["ideal"],
+        "still": replace(FIELD, motion=False),
+        "exact": exact(FIELD),
+        "coefficients": replace(FIELD, coefficient_range=(0.6, 1.4)),
+        "delay": replace(FIELD, position_delay=1),
+        "noise": replace(FIELD, position_noise=1e-3),
+        "lag": replace(FIELD, thruster_time_constant=0.1),
+    },
     "basin": {"sea": SEA, "exact": exact(BASIN)},
     "sea": {"basin": BASIN},
-    "field3d": _elsewhere(SPACE, SPATIAL_PRESETS["ideal"]),
+    "field3d": {
+        "ideal": SPATIAL_PRESETS["ideal"],
+        "exact": exact(SPACE),
+        "delay": replace(SPACE, position_delay=1),
+        "noise": replace(SPACE, position_noise=1e-3),
+    },
 }
 
 
