@@ -84,7 +84,7 @@ def register(
     tuned_for: str = "",
     family: Family | None = None,
 ) -> None:
-    """Register a policy, and as `ID-tuned`, `ID-basin`, `ID-sea` the same with shipped gains.
+    """Register a policy, and the same with shipped gains, as `ID-tuned` or another of `FOLDERS`.
 
     Args:
         id: Its name.
