@@ -46,9 +46,9 @@ MARK = "†"
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes, with half of its 95 % interval;
-worst episode. Largest heading error, °. Variation is how much the command of a thruster changes in
+worst episode. Largest {angles} error, °. Variation is how much the command of a thruster changes in
 a second. Rows are ordered by the objective by which gains and agents are chosen: the means in
-{axes} added up, plus {attitude} mm per degree of heading error and {variation} mm per N/s of thrust
+{axes} added up, plus {attitude} mm per degree of {angles} error and {variation} mm per N/s of thrust
 variation. Going down, rows share a rank (=) until the data tell one from the first of them. "Beats
 the next" says whether the interval of the paired difference to the next row leaves out 0, and with
 what probability an episode goes better. "Over informed" is a row's means over those of the law that
@@ -179,7 +179,10 @@ def in_short(lead: Lead) -> str:
 def markdown(result: LeaderboardResult) -> str:
     """The whole leaderboard as Markdown."""
     legend = LEGEND.format(
-        axes=listed(result.axes), attitude=ATTITUDE_WEIGHT, variation=VARIATION_WEIGHT
+        axes=listed(result.axes),
+        angles=listed(attitude_in(result.main.values())),
+        attitude=ATTITUDE_WEIGHT,
+        variation=VARIATION_WEIGHT,
     )
     axes = " / ".join(result.axes)
     parts = [f"# Leaderboard of usm-gym {result.version}\n", legend]
