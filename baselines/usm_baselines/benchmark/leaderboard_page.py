@@ -46,9 +46,9 @@ MARK = "†"
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes, with half of its 95 % interval;
-worst episode. Largest {angles} error, °. Variation is how much the command of a thruster changes in
+worst episode. Largest {angle} error, °. Variation is how much the command of a thruster changes in
 a second. Rows are ordered by the objective by which gains and agents are chosen: the means in
-{axes} added up, plus {attitude} mm per degree of {angles} error and {variation} mm per N/s of thrust
+{axes} added up, plus {attitude} mm per degree of {angle} error and {variation} mm per N/s of thrust
 variation. Going down, rows share a rank (=) until the data tell one from the first of them. "Beats
 the next" says whether the interval of the paired difference to the next row leaves out 0, and with
 what probability an episode goes better. "Over informed" is a row's means over those of the law that
@@ -180,7 +180,7 @@ def markdown(result: LeaderboardResult) -> str:
     """The whole leaderboard as Markdown."""
     legend = LEGEND.format(
         axes=listed(result.axes),
-        angles=listed(attitude_in(result.main.values())),
+        angle=listed(attitude_in(result.main.values())),
         attitude=ATTITUDE_WEIGHT,
         variation=VARIATION_WEIGHT,
     )
