@@ -178,9 +178,10 @@ def in_short(lead: Lead) -> str:
 
 def markdown(result: LeaderboardResult) -> str:
     """The whole leaderboard as Markdown."""
+    angles = attitude_in(result.main.values())
     legend = LEGEND.format(
         axes=listed(result.axes),
-        angle=listed(attitude_in(result.main.values())),
+        angle=listed(angles) if angles else "attitude",
         attitude=ATTITUDE_WEIGHT,
         variation=VARIATION_WEIGHT,
     )
