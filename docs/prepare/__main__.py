@@ -16,7 +16,12 @@ FOLDER = ROOT / "build" / "docs"
 # What of `docs` is part of the site.
 KINDS = (".md", ".svg", ".gif", ".css", ".js")
 # Pages whose tables need the whole width, and what gives it to them.
-WIDE = ("results/leaderboard.md", "results/space/leaderboard.md", "results/study/study.md")
+WIDE = (
+    "results/leaderboard.md",
+    "results/study/study.md",
+    "results/space/leaderboard.md",
+    "results/space/study/study.md",
+)
 WHOLE = "---\nhide: [navigation, toc]\n---\n\n"
 
 
