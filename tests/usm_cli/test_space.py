@@ -93,6 +93,7 @@ def test_a_file_of_scenarios_may_be_of_another_robot(tmp_path, result):
     ("arguments", "message"),
     [
         (("--suite", "operation3d", "--policies", "residual-ppo"), "robot is SpatialRobot("),
+        (("--suite", "operation", "--policies", "residual-eely"), "robot is Robot("),
         (("--suite", "operation3D"), "suite is 'operation3D'; allowed: operation,"),
         (("--mode", "diving3d"), "invalid choice: 'diving3d'"),
         (("--mode", "operation3d", "--conditions", "calm"), "conditions is 'calm'; allowed: ideal"),

@@ -27,6 +27,7 @@ from usm_baselines.tiers import TIERS, tier_of
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
+from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
 from usm_gym.support.validation import (
     Count,
@@ -37,7 +38,7 @@ from usm_gym.support.validation import (
     validated,
 )
 from usm_gym.task.conditions import conditions_of
-from usm_gym.task.modes import AnyMode
+from usm_gym.task.modes import AnyMode, in_space
 from usm_gym.task.nominal import Nominal
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
@@ -195,6 +196,9 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
         OSError: If it cannot be read.
     """
     agent, network = read_agent(Path(folder))
+    kind = "a robot in space" if in_space(agent.mode) else "the planar robot"
+    known = in_space(agent.mode) == isinstance(nominal.robot, SpatialRobot)
+    require(known, "robot", nominal.robot, f"{kind}, with which {folder} was trained")
     weights = weights_of(agent.base)
     require(agent.base_weights == weights, f"base_weights of {folder}", agent.base_weights, weights)
     base = make(agent.base, nominal, **agent.gains)
