@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 RATE_FILTER = 0.02
 
 
-class BaseVehicle:
+class BaseVehicle(ABC):
     """The nominal robot as a controller deals with it, whatever world it is of.
 
     Attributes:
@@ -81,10 +82,26 @@ class BaseVehicle:
         forces = transposed @ np.linalg.solve(T @ transposed, wrench)
         return np.asarray(forces[..., 0] / seen.thruster_limit)
 
-    def _read(
-        self, observation: ArrayLike, memory: ArrayLike | None, start: Any
+    def read(
+        self, observation: ArrayLike, memory: ArrayLike | None = None, episode_start: Any = None
     ) -> tuple[SimpleNamespace, Array]:
-        """What every robot's `read` gives, and the memory for the next call."""
+        """Read an observation, or a batch of them, in SI units.
+
+        Every entry of the observation is an attribute of what is seen, (..., size of the entry), an
+        entry of one number included; the class has a table of the others.
+
+        Args:
+            observation: (..., numbers), as environments give it.
+            memory: What the last call returned; None at the start.
+            episode_start: Where an episode has just begun, so that the memory is dropped: a bool or
+                an array of them, (...).
+
+        Returns:
+            What is seen, and the memory for the next call.
+
+        Raises:
+            ValueError: If a shape is wrong.
+        """
         given, layout = real_array("observation", observation), self._world.layout
         shape, allowed = given.shape, f"({layout.size},) or (batch, {layout.size})"
         require(shape[-1:] == (layout.size,), "the observation's shape", shape, allowed)
@@ -96,7 +113,13 @@ class BaseVehicle:
         seen.allocation = allocation[:, : self._wrench].reshape(
             *shape[:-1], self._wrench, thrusters
         )
-        return seen, self._remember(seen, self._memory(shape[:-1], memory, start))
+        kept = self._remember(seen, self._memory(shape[:-1], memory, episode_start))
+        self._complete(seen)
+        return seen, kept
+
+    @abstractmethod
+    def _complete(self, seen: SimpleNamespace) -> None:
+        """Add what follows from it for a robot of this world."""
 
     def _memory(self, batch: tuple[int, ...], memory: ArrayLike | None, start: Any) -> Array:
         """Whether the episode has begun, age and value of the position, rate, thruster forces."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from usm_gym.base_vehicle import Array, BaseVehicle
+from usm_gym.base_vehicle import BaseVehicle
 from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.task.nominal import Nominal
 
@@ -23,6 +21,20 @@ class SpatialVehicle(BaseVehicle):
     moment = -100.0 * seen.attitude_error - 170.0 * seen.attitude_rate
     action = vehicle.allocate(force, moment, seen)
     ```
+
+    `read` gives the entries of the observation (docs/tasks_in_space.md), and
+
+    | attribute | size | unit | meaning |
+    |---|---|---|---|
+    | `velocity_error` | 3 | m/s | velocity minus that of the reference, global frame |
+    | `attitude_error` | 2 | rad | errors of pitch and yaw: about y and z of the middle link |
+    | `attitude_rate` | 2 | rad/s | their rates: angular velocity minus that of the reference |
+    | `thruster_forces` | thrusters | N | by the commands, and the nominal lag and dead-band |
+    | `wrench` | 5 | N, N m | force (x, y, z), global frame, and moments (y, z) of these |
+    | `allocation` | (5, thrusters) | 1, m | from forces of the thrusters to that wrench |
+
+    Roll is measured, too (`roll_error`, `angular_velocity`), but thrusters hardly act on it.
+    `velocity_error` is found as by `Vehicle`.
 
     Attributes:
         nominal: The nominal knowledge.
@@ -47,39 +59,6 @@ class SpatialVehicle(BaseVehicle):
         self.robot: SpatialRobot = nominal.robot
         self.inertia, self.drag = self._world.straight_body
 
-    def read(
-        self, observation: ArrayLike, memory: ArrayLike | None = None, episode_start: Any = None
-    ) -> tuple[SimpleNamespace, Array]:
-        """Read an observation, or a batch of them, in SI units.
-
-        Every entry of the observation (docs/tasks_in_space.md) is an attribute, (..., size of the
-        entry), an entry of one number included. Beside them there are
-
-        | attribute | size | unit | meaning |
-        |---|---|---|---|
-        | `velocity_error` | 3 | m/s | velocity minus that of the reference, global frame |
-        | `attitude_error` | 2 | rad | errors of pitch and yaw: about y and z of the middle link |
-        | `attitude_rate` | 2 | rad/s | their rates: angular velocity minus that of the reference |
-        | `thruster_forces` | thrusters | N | by the commands, and the nominal lag and dead-band |
-        | `wrench` | 5 | N, N m | force (x, y, z), global frame, and moments (y, z) of these |
-        | `allocation` | (5, thrusters) | 1, m | from forces of the thrusters to that wrench |
-
-        Roll is measured, too (`roll_error`, `angular_velocity`), but thrusters hardly act on it.
-        For `velocity_error` see `Vehicle.read`.
-
-        Args:
-            observation: (..., numbers), as environments give it.
-            memory: What the last call returned; None at the start.
-            episode_start: Where an episode has just begun, so that the memory is dropped: a bool or
-                an array of them, (...).
-
-        Returns:
-            What is seen, and the memory for the next call.
-
-        Raises:
-            ValueError: If a shape is wrong.
-        """
-        seen, kept = self._read(observation, memory, episode_start)
+    def _complete(self, seen: SimpleNamespace) -> None:
         seen.attitude_error = np.concatenate([seen.pitch_error, seen.yaw_error], axis=-1)
         seen.attitude_rate = seen.angular_velocity[..., 1:] - seen.reference_rates
-        return seen, kept

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +26,22 @@ class Vehicle(BaseVehicle):
     action = vehicle.allocate(-300.0 * seen.position_error, -100.0 * seen.heading_error, seen)
     ```
 
+    `read` gives the entries of the observation (docs/tasks.md), and
+
+    | attribute | size | unit | meaning |
+    |---|---|---|---|
+    | `velocity_error` | 2 | m/s | velocity minus that of the reference, global frame |
+    | `link_angles` | links | rad | from the tail, against the x axis |
+    | `heading_rate` | 1 | rad/s | rate of the mean link angle |
+    | `thruster_forces` | thrusters | N | by the commands, and the nominal lag and dead-band |
+    | `wrench` | 3 | N, N, N m | force (x, y) and moment of these, global frame |
+    | `allocation` | (3, thrusters) | 1, 1, m | from forces of the thrusters to that wrench |
+    | `state` | 9, or 6 | | the states of `linear_model`, as deviations from the reference |
+
+    `velocity_error` is the difference of two measured positions over their distance in time,
+    filtered with a time constant of 0.02 s; where something measures the velocity, it is taken
+    from that instead. It is as late as the measurements are.
+
     Attributes:
         nominal: The nominal knowledge.
         robot: The robot with its nominal coefficients.
@@ -46,41 +61,7 @@ class Vehicle(BaseVehicle):
         super().__init__(nominal, Robot, "the planar robot")
         self.robot: Robot = nominal.robot
 
-    def read(
-        self, observation: ArrayLike, memory: ArrayLike | None = None, episode_start: Any = None
-    ) -> tuple[SimpleNamespace, Array]:
-        """Read an observation, or a batch of them, in SI units.
-
-        Every entry of the observation (docs/tasks.md) is an attribute, (..., size of the entry), an
-        entry of one number included. Beside them there are
-
-        | attribute | size | unit | meaning |
-        |---|---|---|---|
-        | `velocity_error` | 2 | m/s | velocity minus that of the reference, global frame |
-        | `link_angles` | links | rad | from the tail, against the x axis |
-        | `heading_rate` | 1 | rad/s | rate of the mean link angle |
-        | `thruster_forces` | thrusters | N | by the commands, and the nominal lag and dead-band |
-        | `wrench` | 3 | N, N, N m | force (x, y) and moment of these, global frame |
-        | `allocation` | (3, thrusters) | 1, 1, m | from forces of the thrusters to that wrench |
-        | `state` | 9, or 6 | | the states of `linear_model`, as deviations from the reference |
-
-        `velocity_error` is the difference of two measured positions over their distance in time,
-        filtered with a time constant of 0.02 s; where something measures the velocity, it is taken
-        from that instead. It is as late as the measurements are.
-
-        Args:
-            observation: (..., numbers), as environments give it.
-            memory: What the last call returned; None at the start.
-            episode_start: Where an episode has just begun, so that the memory is dropped: a bool or
-                an array of them, (...).
-
-        Returns:
-            What is seen, and the memory for the next call.
-
-        Raises:
-            ValueError: If a shape is wrong.
-        """
-        seen, kept = self._read(observation, memory, episode_start)
+    def _complete(self, seen: SimpleNamespace) -> None:
         bends = np.cumsum(seen.joint_angles, axis=-1)
         seen.link_angles = np.concatenate([seen.tail_angle, seen.tail_angle - bends], axis=-1)
         # Joint i turns the links between it and the head.
@@ -90,7 +71,6 @@ class Vehicle(BaseVehicle):
         state = [seen.position_error, seen.heading_error, seen.velocity_error, seen.heading_rate]
         lagging = [seen.wrench] if self.nominal.thruster_time_constant > 0.0 else []
         seen.state = np.concatenate([*state, *lagging], axis=-1)
-        return seen, kept
 
     def inertia(self, link_angles: ArrayLike | None = None) -> Array:
         """Inertia of the robot with the water that moves along, its joints held.

@@ -197,8 +197,8 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     """
     agent, network = read_agent(Path(folder))
     kind = "a robot in space" if in_space(agent.mode) else "the planar robot"
-    known = in_space(agent.mode) == isinstance(nominal.robot, SpatialRobot)
-    require(known, "robot", nominal.robot, f"{kind}, with which {folder} was trained")
+    same = in_space(agent.mode) == isinstance(nominal.robot, SpatialRobot)
+    require(same, "robot", nominal.robot, f"{kind}, with which {folder} was trained")
     weights = weights_of(agent.base)
     require(agent.base_weights == weights, f"base_weights of {folder}", agent.base_weights, weights)
     base = make(agent.base, nominal, **agent.gains)
