@@ -36,6 +36,7 @@ def test_shipped_gains_can_be_made() -> None:
 def test_every_tier_has_gains() -> None:
     assert set(FOLDERS) == {"field", *tiers.TIERS}
     assert set(FOLDERS.values()) == {folder or "." for folder in gains.FOLDERS.values()}
+    assert all(TIERS.values())
 
 
 # Laws whose episodes take up to ten times as long as others: in space, the search of "field" is too
