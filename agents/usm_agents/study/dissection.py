@@ -23,6 +23,7 @@ from usm_agents.study.trainings import StudyTraining
 from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy, is_privileged
 from usm_gym.suites import unseen
+from usm_gym.task.conditions import IN_SPACE
 from usm_gym.task.modes import AnyScenario
 from usm_gym.task.nominal import Nominal, shared_nominal
 from usm_gym.world import world_of
@@ -158,7 +159,7 @@ def dissected(home: Home, chosen: Sequence[StudyTraining]) -> dict[str, Dissecti
     and nothing can be taken from a base that asks for no force.
     """
     made: dict[str, Dissection] = {}
-    if home.tier != "field":
+    if home.tier.removesuffix(IN_SPACE) != "field":
         return made
     for training in chosen:
         plan = training.plan

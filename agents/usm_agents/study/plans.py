@@ -53,6 +53,15 @@ _RESIDUAL_IN_SPACE = replace(
     steps=2_000_000,
     interval=200_000,
 )
+_ESTIMATOR_IN_SPACE = replace(
+    _ESTIMATOR,
+    env=_RESIDUAL_IN_SPACE.env,
+    base="lqg-joints-eely",
+    conditions=SPACE,
+    steps=3_000_000,
+    interval=250_000,
+)
+_TORPEDO_IN_SPACE = "usm_agents:USM-Torpedo3DResidual-v0"
 
 # The agents that are shipped, each as its seed 0. One whose base is another agent comes after it.
 AGENTS: dict[str, Plan] = {
@@ -72,15 +81,9 @@ AGENTS: dict[str, Plan] = {
         _RESIDUAL, base="estimator-sta-navigator-basin", conditions=BASIN
     ),
     "residual-eely": _RESIDUAL_IN_SPACE,
-    "residual-torpedo-eely": replace(_RESIDUAL_IN_SPACE, env="usm_agents:USM-Torpedo3DResidual-v0"),
-    "estimator-lqg-joints-eely": replace(
-        _ESTIMATOR,
-        env=_RESIDUAL_IN_SPACE.env,
-        base="lqg-joints-eely",
-        conditions=SPACE,
-        steps=3_000_000,
-        interval=250_000,
-    ),
+    "residual-torpedo-eely": replace(_RESIDUAL_IN_SPACE, env=_TORPEDO_IN_SPACE),
+    "estimator-lqg-joints-eely": _ESTIMATOR_IN_SPACE,
+    "estimator-torpedo-eely": replace(_ESTIMATOR_IN_SPACE, env=_TORPEDO_IN_SPACE),
 }
 
 
@@ -120,6 +123,7 @@ HEADLINES = (
     "estimator-lqg-joints-basin",
     "residual-sta-navigator-basin",
     "residual-eely",
+    "estimator-lqg-joints-eely",
 )
 FEWER = {
     "estimator-lqg-joints-sea": 3,
@@ -128,7 +132,7 @@ FEWER = {
     "estimator-sta-navigator-sea": 1,
     # No headline rests on these.
     "residual-torpedo-eely": 3,
-    "estimator-lqg-joints-eely": 3,
+    "estimator-torpedo-eely": 3,
 }
 SEEDS = dict.fromkeys(PLANS, 5) | dict.fromkeys(HEADLINES, 10) | FEWER
 
