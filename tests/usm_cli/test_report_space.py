@@ -4,6 +4,7 @@ import base64
 import dataclasses
 import io
 import re
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -20,14 +21,17 @@ from usm_cli.report.words import in_words
 from usm_gym.rendering import look
 from usm_gym.rendering.depiction import depiction_of
 from usm_gym.rendering.space.camera import View, following
+from usm_gym.rendering.space.figure import spatial_robot_drawing
 from usm_gym.simulation import Simulation
 from usm_gym.spatial_posture import centre_of_mass, link_poses
+from usm_gym.spatial_robot import EELY, EELY_NEUTRAL
 from usm_gym.support.provenance import provenance
 from usm_gym.task.spatial_sampling import nominal_in_space
 from usm_gym.task.spatial_scenario import Scan, SpatialPath
 from usm_gym.task.spatial_water import SpatialWater
 from usm_gym.task.stored_scenario import OtherScenario
 
+ROOT = Path(__file__).parents[2]
 SCENARIO = dataclasses.replace(
     nominal_in_space("operation3d"),
     path=SpatialPath(speed=0.2, ramp=0.0),
@@ -38,8 +42,15 @@ SCENARIO = dataclasses.replace(
 )
 
 
-def page_of(blocks):
-    return page.html([Chapter("Episodes", "Two policies.", blocks)], provenance({}))
+def page_of(blocks, **lists):
+    robots = chapters.robots(lists or {"nominal": [SCENARIO]})
+    return page.html([Chapter("Episodes", "Two policies.", blocks, robots=robots)], provenance({}))
+
+
+def drawings_of(text):
+    """The drawings of robots on a page by their captions."""
+    found = re.findall(r"<figcaption[^>]*>(.+?)</figcaption>\s*<img src=.+?base64,(.+?)\"", text)
+    return {caption: base64.b64decode(data).decode() for caption, data in found}
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +64,8 @@ def block():
 def path(block, tmp_path_factory):
     """The replay on a page."""
     made = tmp_path_factory.mktemp("space") / "page.html"
-    made.write_text(page_of([block]))
+    neutral = [dataclasses.replace(SCENARIO, robot="eely-neutral")]
+    made.write_text(page_of([block], one=[SCENARIO], other=neutral))
     return made
 
 
@@ -73,6 +85,27 @@ def test_only_a_page_with_a_robot_in_space_carries_three_js(block):
     assert len(other) < len(spatial) / 2
     assert not re.search(r"(src|href)=.(?!#|data:)", spatial)
     assert not re.search(r"@import|fetch\(|XMLHttpRequest", spatial)
+
+
+@pytest.mark.parametrize(("name", "robot"), [("eely", EELY), ("eely-neutral", EELY_NEUTRAL)])
+def test_the_drawing_is_of_the_robot_that_swims(name, robot):
+    text = page_of([], suite=[dataclasses.replace(SCENARIO, robot=name)])
+    assert drawings_of(text) == {name: spatial_robot_drawing(robot)}
+
+
+def test_the_leaderboard_says_which_robot_swims_where():
+    (file,) = ROOT.glob("results/*/space/leaderboard.json")
+    choice = chapters.Choice(policies=())
+    made = chapters.chapter(chapters.read(file), choice, lambda *numbers: None)
+    found = drawings_of(page.html([made, made], provenance({})))
+    eely, neutral = found
+    assert eely.startswith("eely: operation3d; ")
+    assert neutral == "eely-neutral: operation3d-neutral"
+    assert [*found.values()] == [*map(spatial_robot_drawing, (EELY, EELY_NEUTRAL))]
+
+
+def test_a_page_without_known_robots_draws_none():
+    assert drawings_of(page_of([], ball=[OtherScenario(world="Elsewhere", fields={})])) == {}
 
 
 def test_a_posture_is_the_robots(simulation):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
+
+from usm_gym.robots import AnyRobot
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,7 @@ class Chapter:
         policies: The policies that it shows, which the page explains.
         verdict: Which controller copes; for the head of the page.
         motion: What joint motion does to the error, if known; for the head of the page.
+        robots: The robots, each by the name of what it swims in; the head of the page draws them.
     """
 
     title: str
@@ -175,3 +178,4 @@ class Chapter:
     policies: Sequence[str] = ()
     verdict: str = ""
     motion: str = ""
+    robots: Mapping[str, AnyRobot] = field(default_factory=dict)

@@ -34,31 +34,21 @@ from usm_cli.report.tables import (
     score_table,
     verdict_table,
 )
-from usm_cli.report.words import PAPERS, in_words, motion, verdict
+from usm_cli.report.words import CONDITIONS, PAPERS, SCORES, in_words, motion, verdict
+from usm_gym.robots import AnyRobot
 from usm_gym.suites import unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.text import counted, figures, listed
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import IN_SPACE
-from usm_gym.task.metrics import ATTITUDE_WEIGHT, MAX_ERROR, VARIATION_WEIGHT
+from usm_gym.task.metrics import MAX_ERROR
 from usm_gym.task.modes import AnyScenario, presets_of
 from usm_gym.task.stored_scenario import OtherScenario
 from usm_gym.world import world_of
 
 Progress = Callable[[int, int], object]
-
-SCORES = (
-    "Largest position error after settling, mean over the episodes; rms is the root mean square, "
-    "variation how much the thrust changes in a second. The objective orders the rows: the error "
-    f"plus {ATTITUDE_WEIGHT} mm per degree of heading error and {VARIATION_WEIGHT} mm per N/s. "
-    "Rows share a rank (=) until the data tell one from the first of them. A lost robot counts "
-    "0.5 m or more."
-)
-CONDITIONS = (
-    "What the simulation does to a controller. Every episode has another current and other "
-    "coefficients, which no controller knows; all meet the same episodes and the same noise."
-)
+Scenarios = Sequence[AnyScenario | OtherScenario]
 
 
 @dataclass(frozen=True)
@@ -122,6 +112,7 @@ def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> 
         policies=list(rows),
         verdict=verdict(rows),
         motion=motion(rows),
+        robots=robots({name: scenarios}),
     )
 
 
@@ -148,6 +139,7 @@ def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -
         policies=list(dict.fromkeys(id for rows in result.suites.values() for id in rows)),
         verdict=verdict(rows),
         motion=motion(rows),
+        robots=robots(known),
     )
 
 
@@ -177,18 +169,15 @@ def robustness(result: RobustnessResult, choice: Choice, progress: Progress) -> 
             provenance(result.provenance),
         ],
         policies=list(result.results),
+        robots=robots({result.quantity: scenarios}),
     )
 
 
 def reproduction(result: ReproductionResult, choice: Choice, progress: Progress) -> Chapter:
     """The paper's Table 1, and its operation mode as a replay at the paper's step."""
     rows, paper, step = result.rows, result.paper, result.step
-    require(
-        choice.policies is None,
-        "--policies",
-        "given",
-        "no policies: a reproduction has its own laws",
-    )
+    own = "no policies: a reproduction has its own laws"
+    require(choice.policies is None, "--policies", "given", own)
     require(choice.scenario == 0, "--scenario", choice.scenario, "0: a reproduction has one")
     chosen = {case.row: case for case in cases(step) if case.mode == "operation"}
     records = {}
@@ -224,22 +213,22 @@ def reproduction(result: ReproductionResult, choice: Choice, progress: Progress)
             provenance(result.provenance),
         ],
         policies=list(rows),
+        robots=robots({"Table 1": [scenario]}),
     )
 
 
 def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
     """Trained agents beside the classical policies, tier by tier; the first one is replayed."""
     homes = result.homes.items()
-    _, first = next(iter(homes))
+    top, first = next(iter(homes))
     rows = by_objective({name: row.home for name, row in first.competitors.items()})
-    conditions = presets_of(first.mode)[first.tier.removesuffix(IN_SPACE)]
-    episodes = unseen(first.mode, conditions, result.seed, result.episodes)
+    episodes = {name: sampled(home, result) for name, home in homes}
     tables = [pair for name, home in homes for pair in sets(name, home).items()]
     return Chapter(
         title="Study of learned agents",
         lead=f"Agents of {len(homes)} tiers with several seeds, and what their parts contribute.",
         blocks=[
-            replay(episodes, rows, first.axes, choice, progress),
+            replay(episodes[top], rows, first.axes, choice, progress),
             Tables(
                 "Scores",
                 f"{SCORES} All seeds together; intervals resample seeds and scenarios.",
@@ -252,7 +241,14 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
         policies=list(dict.fromkeys(policy for _, home in homes for policy in home.rows)),
         verdict=verdict(rows),
         motion=motion(rows),
+        robots=robots(episodes),
     )
+
+
+def sampled(home: HomeResult, result: StudyResult) -> list[AnyScenario]:
+    """The scenarios on which the policies of a home are scored."""
+    conditions = presets_of(home.mode)[home.tier.removesuffix(IN_SPACE)]
+    return unseen(home.mode, conditions, result.seed, result.episodes)
 
 
 def sets(name: str, home: HomeResult) -> dict[str, dict[str, Scores]]:
@@ -289,9 +285,7 @@ def advice(tiers: Mapping[str, Mapping[str, CompetitorScores]]) -> list[Tables]:
     return [Tables("Which controller to take", lead, "tier", tables)] if tables else []
 
 
-def conditions(
-    label: str, name: str, scenarios: Sequence[AnyScenario | OtherScenario], besides: str = ""
-) -> list[Tables]:
+def conditions(label: str, name: str, scenarios: Scenarios, besides: str = "") -> list[Tables]:
     """The conditions of a result, if its scenarios are of a robot of this package."""
     known = [scenario for scenario in scenarios if not isinstance(scenario, OtherScenario)]
     if len(known) < len(scenarios):
@@ -300,13 +294,19 @@ def conditions(
     return [Tables("Conditions", CONDITIONS + besides, label, table)]
 
 
+def robots(lists: Mapping[str, Scenarios]) -> dict[str, AnyRobot]:
+    """The robot of every list of scenarios, which share it, if it is one of this package."""
+    first = {name: scenarios[0] for name, scenarios in lists.items()}
+    return {name: it.body for name, it in first.items() if not isinstance(it, OtherScenario)}
+
+
 def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:
     """Error against thrust variation, if there are scores."""
     return [plots.front({"": rows}, {})] if axes else []
 
 
 def replay(
-    scenarios: Sequence[AnyScenario | OtherScenario],
+    scenarios: Scenarios,
     rows: Mapping[str, Scores | None],
     axes: Sequence[str],
     choice: Choice,

@@ -10,11 +10,9 @@ from typing import Any
 import jinja2
 
 from usm_cli.report.blocks import Chapter, Replay
+from usm_cli.report.stage import stage_of
 from usm_cli.report.words import glossary
-from usm_gym.rendering.figure import robot_drawing
-from usm_gym.rendering.space.figure import spatial_robot_drawing
-from usm_gym.robot import Robot
-from usm_gym.spatial_robot import EELY
+from usm_gym.robots import AnyRobot, name_of
 
 ASSETS = files(__package__)
 STYLES = ("uplot/uPlot.min.css", "page/page.css")
@@ -35,14 +33,6 @@ SPATIAL_SCRIPTS = (
     "page/solids.js",
     "page/solid_scene.js",
     "page/space.js",
-)
-PLANAR_WORDS = (
-    "The robot from above: links 1 to 16 from tail to head, positive thruster forces, the error "
-    "from the path to the centre of mass, and the signs of all angles"
-)
-SPATIAL_WORDS = (
-    "The robot in space from above, from its right and from behind: links 1 to 9 from tail to "
-    "head, joints that turn it to the side and up, and positive thruster forces"
 )
 # Begins when all is there.
 LAST_SCRIPT = "page/page.js"
@@ -70,22 +60,31 @@ def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
         motion=next((chapter.motion for chapter in chapters if chapter.motion), ""),
         verdict=next((chapter.verdict for chapter in chapters if chapter.verdict), ""),
         made=made,
-        robots={view: drawn for view, drawn in drawings().items() if view in (views or {"plane"})},
+        robots=drawings(chapters),
         styles=_text(STYLES),
         scripts=_text((*SCRIPTS, *(SPATIAL_SCRIPTS if "space" in views else ()), LAST_SCRIPT)),
     )
 
 
-def drawings() -> dict[str, dict[str, Any]]:
-    """The drawing of the robot of every view: its data and words."""
-    shown = {
-        "plane": (robot_drawing(Robot()), PLANAR_WORDS),
-        "space": (spatial_robot_drawing(EELY), SPATIAL_WORDS),
-    }
-    return {
-        view: {"data": base64.b64encode(text.encode()).decode(), "words": words}
-        for view, (text, words) in shown.items()
-    }
+def drawings(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
+    """Of every robot the view, the drawing, what it shows, and which robot it is.
+
+    Where there are several, the last says also in what each of them swims.
+    """
+    places: dict[AnyRobot, list[str]] = {}
+    for chapter in chapters:
+        for place, robot in chapter.robots.items():
+            places.setdefault(robot, []).append(place)
+    drawn = []
+    for robot, found in places.items():
+        stage, name = stage_of(robot), name_of(robot)
+        svg, words = stage.drawing()
+        caption = name if isinstance(name, str) else "a robot of its own"
+        if len(places) > 1:
+            caption += f": {'; '.join(dict.fromkeys(found))}"
+        data = base64.b64encode(svg.encode()).decode()
+        drawn.append({"view": stage.view, "data": data, "words": words, "caption": caption})
+    return drawn
 
 
 def _text(names: Sequence[str]) -> str:

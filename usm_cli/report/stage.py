@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from usm_gym.rendering.figure import robot_drawing
 from usm_gym.rendering.look import BODY, BODY_EDGE, HEAD, HEAD_EDGE, TAIL, Colour
 from usm_gym.rendering.picture import Picture
 from usm_gym.rendering.space.body import JET_LENGTH, jet_place, solids
+from usm_gym.rendering.space.figure import spatial_robot_drawing
 from usm_gym.rendering.space.mesh import Solid
 from usm_gym.rendering.space.picture import Pose, SpatialPicture
 from usm_gym.robot import Robot
@@ -43,6 +45,10 @@ class Stage(ABC):
     @abstractmethod
     def robot(self) -> dict[str, Any]:
         """The robot's shape, as the page's scripts take it."""
+
+    @abstractmethod
+    def drawing(self) -> tuple[str, str]:
+        """A drawing of the robot with its signs, as SVG, and what it shows, in words."""
 
     @abstractmethod
     def postures(self, pictures: Sequence[Any]) -> Array:
@@ -79,6 +85,14 @@ class PlanarStage(Stage):
                 for thruster in robot.thrusters
             ],
         }
+
+    def drawing(self) -> tuple[str, str]:
+        """The robot from above on its path."""
+        return robot_drawing(self._robot), (
+            f"The robot from above: links 1 to {self._robot.links} from tail to head, positive "
+            "thruster forces, the error from the path to the centre of mass, and the signs of all "
+            "angles"
+        )
 
     def postures(self, pictures: Sequence[Picture]) -> Array:
         """Link angles, rad, (pictures, links)."""
@@ -120,6 +134,14 @@ class SpatialStage(Stage):
             ],
             "jetLength": JET_LENGTH * float(robot.lengths.sum()),
         }
+
+    def drawing(self) -> tuple[str, str]:
+        """The straight robot from three sides."""
+        return spatial_robot_drawing(self._robot), (
+            "The robot in space from above, from its right and from behind: links 1 to "
+            f"{len(self._robot.links)} from tail to head, joints with the signs of their angles, "
+            "positive thruster forces, and the centres of mass and of buoyancy"
+        )
 
     def postures(self, pictures: Sequence[SpatialPicture]) -> Array:
         """Quaternions (w, x, y, z) and joint angles, (pictures, 4 + joints)."""

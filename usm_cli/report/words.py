@@ -12,11 +12,23 @@ from usm_baselines.registry import base_of, entry, ids
 from usm_cli.report.tables import competes
 from usm_cli.score_table import combined_error, conclusion
 from usm_gym.support.text import counted, figures, listed
+from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 from usm_gym.task.modes import AnyScenario
 from usm_gym.task.spatial_scenario import SpatialScenario
 
 # The paper's controller, with which the best one is compared.
 PAPERS = "sta"
+SCORES = (
+    "Largest position error after settling, mean over the episodes; rms is the root mean square, "
+    "variation how much the thrust changes in a second. The objective orders the rows: the error "
+    f"plus {ATTITUDE_WEIGHT} mm per degree of heading error and {VARIATION_WEIGHT} mm per N/s. "
+    "Rows share a rank (=) until the data tell one from the first of them. A lost robot counts "
+    "0.5 m or more."
+)
+CONDITIONS = (
+    "What the simulation does to a controller. Every episode has another current and other "
+    "coefficients, which no controller knows; all meet the same episodes and the same noise."
+)
 # Ends of the names of policies that are forms of others, as the glossary explains them.
 FORMS = {
     "lag": "the same law, told the lag of the thrusters",

@@ -94,12 +94,17 @@ def spatial_robot_drawing(robot: SpatialRobot) -> str:
     """
     title = f"A swimming manipulator of {len(robot.links)} links in space"
     root = len(robot.links) // 2 + 1
+    places = (
+        "mass lie below the axis, centres of buoyancy on it"
+        if robot.keels.any()
+        else "mass and of buoyancy lie on the axis"
+    )
     description = (
         f"The straight robot from above and from its right side: links 1 at the tail to "
         f"{len(robot.links)} at the head with their lengths; joints about z turn the head to the "
         "left and joints about y lower it, if their angles are positive; "
         f"{len(robot.thrusters)} numbered thrusters with arrows of positive forces. Link {root} is "
-        "the root. From behind: centres of mass lie below the axis, centres of buoyancy on it."
+        f"the root. From behind: centres of {places}."
     )
     sides = Side(robot, "from above", "y", ABOVE), Side(robot, "from the right", "z", BESIDE)
     marks = [_side(side) for side in sides]
@@ -179,7 +184,10 @@ def _joint_symbol(side: Side, k: int) -> str:
 def _turned(side: Side) -> str:
     """What the last joint in the plane of the drawing does, if its angle is positive."""
     robot = side.robot
-    joint = max(k for k, axis in enumerate(robot.joint_axes) if abs(axis[side.across]) > 0.5)
+    turning = [k for k, axis in enumerate(robot.joint_axes) if abs(axis[side.across]) > 0.5]
+    if not turning:
+        return ""
+    joint = turning[-1]
     angles = np.zeros(len(robot.joint_axes))
     angles[joint] = ANGLE
     rotations, centres = _posed(robot, angles)

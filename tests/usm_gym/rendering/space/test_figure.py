@@ -9,7 +9,7 @@ import pytest
 
 from usm_gym.rendering.space.figure import spatial_robot_drawing
 from usm_gym.spatial_posture import link_poses
-from usm_gym.spatial_robot import EELY
+from usm_gym.spatial_robot import EELY, EELY_NEUTRAL, Z
 
 SVG = "{http://www.w3.org/2000/svg}"
 # Forces and numbers of thrusters that nothing but the data can tell.
@@ -27,6 +27,10 @@ class Drawing:
 
     def __init__(self, robot):
         self.root = ET.fromstring(spatial_robot_drawing(robot))
+
+    @property
+    def description(self):
+        return self.root.findtext(SVG + "desc")
 
     def part(self, name):
         (part,) = (group for group in self.root.iter(SVG + "g") if group.get("id") == name)
@@ -124,3 +128,15 @@ def test_from_behind_left_is_left_and_the_centre_of_mass_is_below(robot, drawing
     assert mass[0] == buoyancy[0]
     assert mass[1] < buoyancy[1]
     assert "centre of mass, 3 cm lower" in drawing.words("section")
+    assert "centres of mass lie below the axis" in drawing.description
+
+
+def test_without_a_keel_the_centre_of_mass_is_that_of_buoyancy():
+    drawing = Drawing(EELY_NEUTRAL)
+    assert "centre of mass" in drawing.words("section")
+    assert "centres of mass and of buoyancy lie on the axis" in drawing.description
+
+
+def test_a_robot_whose_joints_all_turn_about_one_axis_is_drawn():
+    upright = dataclasses.replace(EELY, joint_axes=8 * (Z,))
+    assert Drawing(upright).words("turned-y") == ["φ8 > 0"]
