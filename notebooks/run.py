@@ -12,8 +12,8 @@ from nbclient import NotebookClient
 from PIL import Image
 
 FOLDER = Path(__file__).parent
-# Of a picture; few are enough for lines and letters, and make small files.
-PALETTE = 64
+# Of a picture; few make a small file.
+PALETTE = 256
 
 
 def run(notebook, folder):
@@ -48,7 +48,9 @@ def compact(output):
     if "image/png" in data:
         drawn = Image.open(io.BytesIO(base64.b64decode(data["image/png"]))).convert("RGB")
         small = io.BytesIO()
-        drawn.quantize(PALETTE).save(small, "png", optimize=True)
+        # Spread over all colours, and then moved, so that a small part keeps its own.
+        few = drawn.quantize(PALETTE, Image.Quantize.MAXCOVERAGE, kmeans=3)
+        few.save(small, "png", optimize=True)
         data["image/png"] = base64.b64encode(small.getvalue()).decode()
         output.metadata = {}
     return output

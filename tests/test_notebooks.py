@@ -13,6 +13,7 @@ run, code, digest = itemgetter("run", "code", "digest")(runpy.run_path(str(NOTEB
 # What the cell tagged "parameters" is to say instead, so that a run is short.
 SHORT = {
     "first_steps": {"PICTURE": 1.0, "EPISODES": 2},
+    "in_space": {"PICTURE": 1.0, "EPISODES": 2},
     "own_controller": {"BANDWIDTHS": (6.0, 10.0), "SAMPLED": 2, "EPISODES": 2},
     "train_residual": {"STEPS": 1, "EPISODES": 2},
 }

@@ -3,6 +3,9 @@
 import base64
 import json
 
+# Pictures, and how the names of their files end.
+KINDS = {"image/png": "png", "image/svg+xml": "svg"}
+
 
 def parts(path, source):
     """The page of a notebook, and its pictures by their names.
@@ -18,9 +21,12 @@ def parts(path, source):
         blocks.append(words if cell["cell_type"] == "markdown" else f"```python\n{words}\n```")
         for output in cell.get("outputs", ()):
             data = output.get("data", {"text/plain": output.get("text", [])})
-            if "image/png" in data:
-                name = f"{path.stem}-{cell['id']}.png"
-                pictures[name] = base64.b64decode("".join(data["image/png"]))
+            kind = next((kind for kind in KINDS if kind in data), None)
+            if kind:
+                name = f"{path.stem}-{cell['id']}.{KINDS[kind]}"
+                drawn = "".join(data[kind])
+                text = kind == "image/svg+xml"
+                pictures[name] = drawn.encode() if text else base64.b64decode(drawn)
                 blocks.append(f"![{cell['metadata']['alt']}]({name})")
             elif "text/markdown" in data:
                 blocks.append("".join(data["text/markdown"]))
