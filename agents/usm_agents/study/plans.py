@@ -123,7 +123,6 @@ HEADLINES = (
     "estimator-lqg-joints-basin",
     "residual-sta-navigator-basin",
     "residual-eely",
-    "estimator-lqg-joints-eely",
 )
 FEWER = {
     "estimator-lqg-joints-sea": 3,
