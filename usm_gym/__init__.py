@@ -4,6 +4,7 @@ from importlib.metadata import version
 
 from usm_gym.dynamics import accelerations
 from usm_gym.evaluation import Evaluation, evaluate
+from usm_gym.head_world import HeadWorld
 from usm_gym.linear_model import LinearModel, linearise
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.registration import register_environments
@@ -15,6 +16,8 @@ from usm_gym.spatial_world import SpatialWorld
 from usm_gym.statistics import compare
 from usm_gym.suites import suite
 from usm_gym.task.conditions import Conditions
+from usm_gym.task.head_path import HeadPath
+from usm_gym.task.head_scenario import HeadScenario, SpatialHeadScenario
 from usm_gym.task.metrics import max_error
 from usm_gym.task.scenario import Inspection, Path, Scenario
 from usm_gym.task.spatial_scenario import Scan, SpatialPath, SpatialScenario
@@ -25,6 +28,9 @@ from usm_gym.vehicle import Vehicle
 __all__ = [
     "Conditions",
     "Evaluation",
+    "HeadPath",
+    "HeadScenario",
+    "HeadWorld",
     "Inspection",
     "LinearModel",
     "Link",
@@ -33,6 +39,7 @@ __all__ = [
     "Robot",
     "Scan",
     "Scenario",
+    "SpatialHeadScenario",
     "SpatialPath",
     "SpatialRobot",
     "SpatialScenario",

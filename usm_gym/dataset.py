@@ -170,7 +170,7 @@ class _Recorder:
         self._observations.append(simulation.observation.copy())
         self._infos.append({key: values.copy() for key, values in infos(simulation).items()})
         if self._answer is not None:
-            action = as_action(self._answer[0], (simulation.size, simulation.world.thrusters))
+            action = as_action(self._answer[0], (simulation.size, simulation.world.actions))
             self._actions.append(np.clip(action, -1.0, 1.0))
             self._outcomes.append(outcome(simulation))
 

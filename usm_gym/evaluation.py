@@ -27,6 +27,8 @@ MOST_SAMPLES = 50_000_000
 # Per axis.
 POSITION_METRICS = ("max_error", "settled_error", "rms_error")
 THRUST_METRICS = ("thrust_effort", "thrust_variation", "saturation_share")
+# Mean absolute commanded rate of the joints, rad/s, where a policy moves them.
+JOINT_EFFORT = "joint_effort"
 # Shifts of a scan after which the largest errors are kept, per axis: they show what is learned.
 SHIFT_METRICS = {
     "first_shift_error": 0,
@@ -48,6 +50,8 @@ class Trajectory:
         error: True position errors, m, (samples, axes).
         attitude_error: Attitude errors, rad, (samples, angles).
         command: Thruster commands after saturation, N, (samples, thrusters).
+        joint_rates: Commanded rates of the joints that a policy moves, rad/s, (samples, joints); no
+            joints where it moves none.
         lost: Whether the robot was lost.
     """
 
@@ -56,6 +60,7 @@ class Trajectory:
     error: NDArray[np.float64]
     attitude_error: NDArray[np.float64]
     command: NDArray[np.float64]
+    joint_rates: NDArray[np.float64]
     lost: bool
 
 
@@ -195,7 +200,8 @@ def metric_names(world: World, by_shift: bool = False) -> list[str]:
     """
     position = [f"{name}_{axis}" for name in POSITION_METRICS for axis in world.axes]
     shifts = [f"{name}_{axis}" for name in SHIFT_METRICS for axis in world.axes]
-    return [*position, *_angle_metrics(world), *THRUST_METRICS, *(shifts if by_shift else ())]
+    efforts = [*THRUST_METRICS, *([JOINT_EFFORT] if world.actions > world.thrusters else ())]
+    return [*position, *_angle_metrics(world), *efforts, *(shifts if by_shift else ())]
 
 
 def _angle_metrics(world: World) -> list[str]:
@@ -227,6 +233,8 @@ def score(trajectory: Trajectory) -> dict[str, float | bool]:
         metrics.saturation_share(trajectory.command, conditions.thruster_limit),
     )
     found |= dict(zip(THRUST_METRICS, values, strict=True))
+    if trajectory.joint_rates.size > 0:
+        found[JOINT_EFFORT] = float(np.abs(trajectory.joint_rates).mean())
     names = metric_names(world, scored_by_shift(scenario))
     return {**{name: found[name] for name in names}, FAILED: lost}
 
@@ -269,7 +277,9 @@ class _Recording:
         self._ends = simulation.steps.copy()
         self._error = np.empty((length, *simulation.error.shape))
         self._attitude_error = np.empty((length, *simulation.attitude_error.shape))
-        self._command = np.empty((length, size, simulation.world.thrusters))
+        world = simulation.world
+        self._command = np.empty((length, size, world.thrusters))
+        self._joint_rates = np.empty((length, size, world.actions - world.thrusters))
 
     def alive(self, period: int) -> NDArray[np.bool_]:
         """Whose episodes are going on in a control period."""
@@ -281,6 +291,8 @@ class _Recording:
         self._error[period] = simulation.error
         self._attitude_error[period] = simulation.attitude_error
         self._command[period] = simulation.read("command")
+        if self._joint_rates.size > 0:
+            self._joint_rates[period] = simulation.read("joint_commands")
         now = simulation.lost & self.alive(period)
         self._ends[now] = period + 1
         self.lost |= now
@@ -295,6 +307,7 @@ class _Recording:
                 error=self._error[:end, index],
                 attitude_error=self._attitude_error[:end, index],
                 command=self._command[:end, index],
+                joint_rates=self._joint_rates[:end, index],
                 lost=bool(self.lost[index]),
             )
             for index, (scenario, end) in enumerate(zip(scenarios, self._ends, strict=True))
@@ -324,7 +337,7 @@ def _run(
             "a pair (action, state)",
         )
         state = answer[1]
-        action = as_action(answer[0], (size, simulation.world.thrusters))
+        action = as_action(answer[0], (size, simulation.world.actions))
         missing = np.isnan(action)
         require(not missing[recording.alive(k)].any(), "the policy's action", "NaN", "numbers")
         simulation.step(np.where(missing, np.float32(0.0), action))
@@ -371,6 +384,7 @@ def _at_rest(scenario: Any) -> Trajectory:
         error=np.zeros((samples, len(world.axes))),
         attitude_error=np.zeros((samples, len(world.attitude) + len(world.watched))),
         command=np.zeros((samples, world.thrusters)),
+        joint_rates=np.zeros((samples, world.actions - world.thrusters)),
         lost=False,
     )
 

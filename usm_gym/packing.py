@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Plant
 from usm_gym.plant.references import NEVER, filter_coefficients
+from usm_gym.plant.steering import UNSTEERED, Steering
 from usm_gym.plant.thrusters import lag_shares
 from usm_gym.robot import Drag, Hydrodynamics, Robot
 
@@ -22,6 +23,7 @@ def plant_of(
     drag: Drag = "linear and quadratic",
     shifts: int = 0,
     sinusoids: int = 0,
+    steering: Steering = UNSTEERED,
 ) -> Plant:
     """What all copies of a robot share.
 
@@ -35,6 +37,7 @@ def plant_of(
         drag: Terms of the drag.
         shifts: Largest number of changes of the joint references in any episode.
         sinusoids: Largest number of sinusoids in the water's velocity in any episode.
+        steering: How a policy steers the joints, if it does.
     """
     return Plant(
         l=robot.half_length,
@@ -50,6 +53,7 @@ def plant_of(
         substeps=substeps,
         shifts=shifts,
         sinusoids=sinusoids,
+        **steering._asdict(),
     )
 
 

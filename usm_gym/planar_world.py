@@ -16,11 +16,13 @@ from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout as rows
 from usm_gym.plant.chain import Plant
+from usm_gym.plant.steering import steer
 from usm_gym.plant.step import advance
 from usm_gym.plant.thrusters import command
 from usm_gym.robot import Robot
 from usm_gym.support.validation import require
 from usm_gym.task import guidance
+from usm_gym.task.head_observation import observe_head
 from usm_gym.task.metrics import note_largest
 from usm_gym.task.observation import (
     ENTRY,
@@ -69,6 +71,8 @@ def observe(fleet, plant, table, robot, lanes):
             velocity = seen[AXES + axis] + noises[axis]
             observation[k + axis] = velocity * table.gain[k + axis]
     measure_age(ENTRY.velocity_age, age, table, observation)
+    if plant.steering > 0:
+        observe_head(fleet, plant, table, robot, lanes)
     for k in range(observation.size):
         observation[k] = min(max(observation[k], -table.bound[k]), table.bound[k])
 
@@ -76,12 +80,14 @@ def observe(fleet, plant, table, robot, lanes):
 @piece
 def run(fleet, plant, table, actions, like, lanes, stride, first, last):
     """One control period of blocks `first` to `last`: command, advance, measure."""
-    size, thrusters = actions.shape[0], rows.thruster_rows(plant.links, actions.shape[1])
+    size, thrusters = actions.shape[0], plant.thruster_links.size
+    places = rows.thruster_rows(plant.links, thrusters)
     for k in range(first, last):
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
-            fleet.effort[robot] = command(
-                fleet.blocks[k], lanes, robot - k * lanes, thrusters, actions[robot]
-            )
+            block, lane, action = fleet.blocks[k], robot - k * lanes, actions[robot]
+            fleet.effort[robot] = command(block, lanes, lane, places, action[:thrusters])
+            if plant.steering > 0:
+                steer(block, lanes, lane, plant, action[thrusters:])
         advance(block_at(fleet.blocks, k, like), like, spread(0.0), stride, plant)
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
             fleet.instant[robot] += 1

@@ -128,3 +128,17 @@ def value(observation, table, entry, index):
     """
     k = table.starts[entry] + index
     return observation[k] * table.scale[k]
+
+
+@piece
+def known(observation, table, entry, index):
+    """The same, `table` being a `Table`, while an observation is filled in."""
+    k = table.starts[entry] + index
+    return observation[k] / table.gain[k]
+
+
+@piece
+def put(observation, table, entry, index, value):
+    """Fill in one number of an observation from its physical value."""
+    k = table.starts[entry] + index
+    observation[k] = value * table.gain[k]

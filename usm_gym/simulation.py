@@ -30,7 +30,7 @@ class Snapshot:
         scenarios: The scenarios in progress.
         arrays: The state.
         past: What is still to be measured, see `usm_gym.world.Fleet`.
-        commands: Commands that are still to take effect, (size, periods, thrusters).
+        commands: Actions that are still to take effect, (size, periods, numbers).
     """
 
     scenarios: tuple[Any, ...]
@@ -96,7 +96,7 @@ class Simulation:
         self._past = np.zeros((self.size, 1, 2 * axes))
         # Commands that have not taken effect yet; those of period i at i modulo their number.
         self._wait = np.zeros(self.size, np.int64)
-        self._commands = np.zeros((self.size, 1, self.world.thrusters), np.float32)
+        self._commands = np.zeros((self.size, 1, self.world.actions), np.float32)
         self._taken = np.zeros((self.size, 1, 2), np.int32)
         self._noise = np.zeros((self.size, 1, axes))
         self._other_noise = np.zeros((self.size, 1, 0), np.float32)
@@ -119,10 +119,19 @@ class Simulation:
         return rows.swapaxes(1, 2).reshape(-1, rows.shape[1])[: self.size].copy()
 
     @property
+    def mass_error(self) -> Array:
+        """True position errors of the centres of mass, m, (size, axes), whatever is scored."""
+        return self._mass[:, : len(self.world.axes)]
+
+    @property
     def velocity(self) -> Array:
-        """True velocities of what has to follow the path, m/s, (size, axes)."""
-        now = self._past[np.arange(self.size), self.count % self._past.shape[1]]
-        return now[:, len(self.world.axes) :]
+        """True velocities of the centres of mass, m/s, (size, axes)."""
+        return self._mass[:, len(self.world.axes) :]
+
+    @property
+    def _mass(self) -> Array:
+        mass: Array = self._past[np.arange(self.size), self.count % self._past.shape[1]]
+        return mass
 
     def check(self, scenario: Any) -> None:
         """Refuse a scenario that `start` would refuse.
@@ -178,8 +187,8 @@ class Simulation:
         """Advance every robot by one control period.
 
         Args:
-            action: Thruster commands over the thruster limits, (size, thrusters); values beyond
-                [-1, 1] saturate.
+            action: Commands over their limits, those of the thrusters first, (size, `actions` of
+                the world); values beyond [-1, 1] saturate.
         """
         kernels = self.world.kernels
         if self._commands.shape[1] > 1:

@@ -12,6 +12,7 @@ from usm_gym.kernels.lanes import padded
 from usm_gym.plant.references import NEVER, filter_coefficients
 from usm_gym.plant.spatial import layout as rows
 from usm_gym.plant.spatial.links import SpatialPlant
+from usm_gym.plant.steering import UNSTEERED, Steering
 from usm_gym.plant.thrusters import lag_shares
 from usm_gym.spatial_robot import LINEAR_SHARE, SpatialRobot, Vector, Y, Z
 
@@ -26,6 +27,7 @@ def spatial_plant(
     euler: bool = False,
     shifts: int = 0,
     sinusoids: int = 0,
+    steering: Steering = UNSTEERED,
 ) -> SpatialPlant:
     """What all copies of a robot share.
 
@@ -37,6 +39,7 @@ def spatial_plant(
             than in its middle.
         shifts: Largest number of changes of the joint references in any episode.
         sinusoids: Largest number of sinusoids in the water's velocity in any episode.
+        steering: How a policy steers the joints, if it does.
     """
     return _at_rest(robot)._replace(
         lead=0.0 if euler else 0.5 * step,
@@ -44,6 +47,7 @@ def spatial_plant(
         substeps=substeps,
         shifts=shifts,
         sinusoids=sinusoids,
+        **steering._asdict(),
     )
 
 
@@ -109,6 +113,7 @@ def _at_rest(robot: SpatialRobot) -> SpatialPlant:
         substeps=1,
         shifts=0,
         sinusoids=0,
+        **UNSTEERED._asdict(),
     )
 
 

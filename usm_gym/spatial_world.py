@@ -16,13 +16,16 @@ from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.plant.spatial import layout as rows
 from usm_gym.plant.spatial.links import SpatialPlant
 from usm_gym.plant.spatial.step import advance
+from usm_gym.plant.steering import steer
 from usm_gym.plant.thrusters import command
+from usm_gym.sensors import put
 from usm_gym.spatial_packing import spatial_plant, spatial_row
 from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.support.validation import require
 from usm_gym.task import spatial_guidance as guidance
 from usm_gym.task.metrics import note_largest
 from usm_gym.task.spatial_guidance import attitude_error, path_in_space, sight_in_space, sight_rates
+from usm_gym.task.spatial_head_observation import observe_head_in_space
 from usm_gym.task.spatial_observation import (
     SPATIAL_ENTRY,
     SpatialLayout,
@@ -32,7 +35,6 @@ from usm_gym.task.spatial_observation import (
     measure_joints,
     measure_thrusters,
     number,
-    put,
     put_vector,
     spatial_allocations,
     vector,
@@ -78,6 +80,8 @@ def observe(fleet, plant, table, robot, lanes):
         velocity = seen[3] + noises[0], seen[4] + noises[1], seen[5] + noises[2]
     put_vector(observation, table, SPATIAL_ENTRY.velocity, velocity)
     put(observation, table, SPATIAL_ENTRY.velocity_age, 0, age)
+    if plant.steering > 0:
+        observe_head_in_space(fleet, plant, table, robot, lanes)
     for k in range(observation.size):
         observation[k] = min(max(observation[k], -table.bound[k]), table.bound[k])
 
@@ -143,12 +147,14 @@ def face(row, lanes, lane, plant, reference, measured, noises, table, angles, ob
 @piece
 def run(fleet, plant, table, actions, like, lanes, stride, first, last):
     """One control period of blocks `first` to `last`: command, advance, measure."""
-    size, thrusters = actions.shape[0], rows.thruster_rows(plant.links, plant.thrusters)
+    size, thrusters = actions.shape[0], plant.thrusters
+    places = rows.thruster_rows(plant.links, thrusters)
     for k in range(first, last):
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
-            fleet.effort[robot] = command(
-                fleet.blocks[k], lanes, robot - k * lanes, thrusters, actions[robot]
-            )
+            block, lane, action = fleet.blocks[k], robot - k * lanes, actions[robot]
+            fleet.effort[robot] = command(block, lanes, lane, places, action[:thrusters])
+            if plant.steering > 0:
+                steer(block, lanes, lane, plant, action[thrusters:])
         advance(block_at(fleet.blocks, k, like), like, spread(0.0), stride, plant)
         for robot in range(k * lanes, min((k + 1) * lanes, size)):
             fleet.instant[robot] += 1

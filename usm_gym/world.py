@@ -71,7 +71,7 @@ class Kernels(NamedTuple):
     """The compiled entry points of a world.
 
     `shared` is what `World.shared` gives, `table` that of the observation, `actions` the commands
-    over the limits, (size, thrusters).
+    over the limits, (size, `World.actions`).
 
     Attributes:
         observe: `(fleet, shared, table, index, lanes)`: fill in errors and observation of a robot.
@@ -181,6 +181,11 @@ class World(ABC):
     @abstractmethod
     def thrusters(self) -> int:
         """Thrusters of a robot."""
+
+    @property
+    def actions(self) -> int:
+        """Numbers of an action, those of the thrusters first."""
+        return self.thrusters
 
     @property
     @abstractmethod

@@ -26,7 +26,10 @@ KNOWN = {
     *("position_noise", "position_period", "position_delay"),
     *("velocity_noise", "velocity_period", "velocity_delay"),
     *("tail_angle_noise", "joint_angle_noise", "rate_noise"),
+    "joint_time_constant",
 }
+# These are no conditions.
+OF_ROBOT = {"robot", "joint_time_constant"}
 
 
 def secrets(scenario: AnyScenario) -> set[float]:
@@ -57,7 +60,7 @@ def test_nominal_knowledge_is_that_of_the_conditions_and_no_more(suite: str) -> 
     episodes = usm_gym.suite(suite)
     conditions = presets_of(episodes[0].mode)[suite.partition("-")[2]]
     (nominal,) = {scenario.nominal for scenario in episodes}
-    for name in KNOWN - {"robot"}:
+    for name in KNOWN - OF_ROBOT:
         assert getattr(nominal, name) == getattr(conditions, name)
     known = set(leaves(asdict(nominal)))
     for scenario in episodes:

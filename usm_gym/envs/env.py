@@ -104,7 +104,7 @@ class TrackingEnv(gym.Env[Observation, NDArray[np.float32]]):
         simulation = self._running
         if self._over:
             raise gym.error.ResetNeeded("the episode is over: call reset()")
-        batch = checked_action(action, (self.world.thrusters,))[np.newaxis]
+        batch = checked_action(action, (self.world.actions,))[np.newaxis]
         simulation.step(batch)
         rewards, terminated, truncated = outcome(simulation)
         self._over = bool(terminated[0] or truncated[0])
@@ -160,7 +160,7 @@ def render_fps(conditions: Conditions) -> int:
 
 def action_space(world: World) -> gym.Space[NDArray[np.float32]]:
     """The action space of a world."""
-    return gym.spaces.Box(-1.0, 1.0, (world.thrusters,), np.float32)
+    return gym.spaces.Box(-1.0, 1.0, (world.actions,), np.float32)
 
 
 def checked_action(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:

@@ -45,7 +45,7 @@ class ModeEnv(TrackingEnv):
         """
         require_mode(mode, self.modes)
         sampler = sampler_of(mode, conditions, robot)
-        self.mode, self.conditions, self.robot = mode, sampler.conditions, sampler.body
+        self.mode, self.conditions, self.robot = mode, sampler.conditions, sampler.robot
         super().__init__(sampler, render_mode)
 
 
@@ -85,5 +85,5 @@ class ModeVectorEnv(TrackingVectorEnv):
         """
         require_mode(mode, self.modes)
         sampler = sampler_of(mode, conditions, robot)
-        self.mode, self.conditions, self.robot = mode, sampler.conditions, sampler.body
+        self.mode, self.conditions, self.robot = mode, sampler.conditions, sampler.robot
         super().__init__(num_envs, sampler, autoreset_mode, threads, render_mode, render_index)

@@ -183,7 +183,7 @@ class TrackingVectorEnv(gym.vector.VectorEnv[Observations, NDArray[np.float32], 
             gymnasium.error.ResetNeeded: If, without autoreset, an episode has ended.
         """
         simulation = self.simulation
-        batch = checked_action(actions, (self.num_envs, self.world.thrusters))
+        batch = checked_action(actions, (self.num_envs, self.world.actions))
         waiting = self._done.copy()
         if self.autoreset_mode is AutoresetMode.DISABLED and waiting.any():
             raise gym.error.ResetNeeded(f"robots {np.flatnonzero(waiting).tolist()} wait for reset")

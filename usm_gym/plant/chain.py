@@ -40,6 +40,8 @@ class Plant(NamedTuple):
         substeps: Physics steps in a control period.
         shifts: Largest number of changes of the joint references in any episode.
         sinusoids: Largest number of sinusoids in the water's velocity in any episode.
+        steering: How a policy steers the joints, if it does: this and what follows as in
+            `plant.steering.Steering`.
     """
 
     l: float
@@ -55,6 +57,11 @@ class Plant(NamedTuple):
     substeps: int
     shifts: int
     sinusoids: int
+    steering: int
+    joint_time_constant: float
+    joint_decay: float
+    joint_rate_limit: float
+    joint_angle_limit: float
 
 
 @piece

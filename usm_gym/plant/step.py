@@ -40,7 +40,7 @@ def physics_step(block, like, wide, stride, plant, base):
     links, h, lead = plant.links, plant.h, plant.lead
     asked = advance_references(block, like, REFERENCES, plant.shifts, h, lead)
     push(block, like, plant)
-    joint_torques(block, like, wide, stride, links, lead, asked)
+    joint_torques(block, like, wide, stride, plant, asked)
     accelerate(block, like, wide, stride, links, base, plant)
     integrate(block, like, wide, stride, links, h, lead)
 

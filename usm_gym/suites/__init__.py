@@ -28,6 +28,10 @@ NAMES = (
     "operation3d-sea",
     "operation3d-neutral",
     "torpedo3d",
+    "head",
+    "head-basin",
+    "head3d",
+    "head3d-basin",
 )
 
 

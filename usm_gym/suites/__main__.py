@@ -28,6 +28,10 @@ RECIPES: dict[str, tuple[AnyMode, str, int, int]] = {
     "operation3d-sea": ("operation3d", "sea", 50, 9),
     "operation3d-neutral": ("operation3d", "field", 50, 10),
     "torpedo3d": ("torpedo3d", "field", 50, 11),
+    "head": ("head", "field", 50, 12),
+    "head-basin": ("head", "basin", 50, 13),
+    "head3d": ("head3d", "field", 50, 14),
+    "head3d-basin": ("head3d", "basin", 50, 15),
 }
 # Suites of other robots than the paper's and Eely.
 ROBOTS = {"operation3d-neutral": "eely-neutral"}

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, Strict, TypeAdapter
 
+from usm_gym.manipulator import bare
 from usm_gym.robots import name_of
 from usm_gym.support.validation import Number, build, require
 from usm_gym.task.conditions import Conditions, require_whole_steps
@@ -36,7 +37,7 @@ class BaseScenario(ABC):
         """Refuse a duration of no whole number of control periods or too many steps, and names."""
         if self.robot != self.usual:
             # Another process need not know a name that was given here.
-            body = self.body
+            body = bare(self.body)
             robot = self.usual if name_of(body) == self.usual else body
             object.__setattr__(self, "robot", robot)
         require_whole_steps(self.duration, self.conditions)

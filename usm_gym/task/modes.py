@@ -1,4 +1,4 @@
-"""All modes, in the plane and in space: their conditions, scenarios and samplers."""
+"""All modes, of plane and space, of body and head: their conditions and scenarios."""
 
 from __future__ import annotations
 
@@ -10,19 +10,45 @@ import numpy as np
 from usm_gym.robots import EELY, PAPER
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS, Conditions
+from usm_gym.task.head_sampling import (
+    AnyHeadMode,
+    AnyHeadScenario,
+    nominal_head,
+    sample_head,
+)
+from usm_gym.task.head_scenario import (
+    HEAD_MODES,
+    SPATIAL_HEAD_MODES,
+    HeadScenario,
+    SpatialHeadScenario,
+)
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import MODES, Mode, Scenario, require_mode
 from usm_gym.task.spatial_sampling import nominal_in_space, sample_in_space
 from usm_gym.task.spatial_scenario import SPATIAL_MODES, SpatialMode, SpatialScenario
 
-AnyMode = Mode | SpatialMode
-AnyScenario = Scenario | SpatialScenario
-ALL_MODES: tuple[AnyMode, ...] = (*MODES, *SPATIAL_MODES)
+AnyMode = Mode | SpatialMode | AnyHeadMode
+AnyScenario = Scenario | SpatialScenario | AnyHeadScenario
+# In these the policy moves the joints, too, and the head follows a path.
+ALL_HEAD_MODES: tuple[AnyHeadMode, ...] = (*HEAD_MODES, *SPATIAL_HEAD_MODES)
+ALL_MODES: tuple[AnyMode, ...] = (*MODES, *SPATIAL_MODES, *ALL_HEAD_MODES)
 
 
 def in_space(mode: str) -> bool:
     """Whether a mode is one of the spatial robot."""
-    return mode in SPATIAL_MODES
+    return mode in (*SPATIAL_MODES, *SPATIAL_HEAD_MODES)
+
+
+def of_head(mode: str) -> bool:
+    """Whether in a mode the policy moves the joints, too, and the head follows a path."""
+    return mode in ALL_HEAD_MODES
+
+
+def kind_of(mode: str) -> type[Any]:
+    """The class of the scenarios of a mode."""
+    if of_head(mode):
+        return SpatialHeadScenario if in_space(mode) else HeadScenario
+    return SpatialScenario if in_space(mode) else Scenario
 
 
 def presets_of(mode: str) -> Mapping[str, Conditions]:
@@ -45,6 +71,8 @@ def sample_of(
         ValueError: If there is no such mode.
     """
     require_mode(mode, ALL_MODES)
+    if of_head(mode):
+        return sample_head(mode, conditions, stream, robot)  # type: ignore[arg-type]
     if in_space(mode):
         return sample_in_space(mode, conditions, stream, robot or EELY)  # type: ignore[arg-type]
     return sample(mode, conditions, stream, robot or PAPER)  # type: ignore[arg-type]
@@ -56,8 +84,11 @@ def named_of(name: str, mode: AnyMode, conditions: Conditions, robot: Any) -> An
     Raises:
         ValueError: If there is none of that name.
     """
-    if in_space(mode):
+    if of_head(mode) or in_space(mode):
         require(name == "nominal", "scenario", name, "nominal")
+    if of_head(mode):
+        return nominal_head(mode, conditions, robot)  # type: ignore[arg-type]
+    if in_space(mode):
         return nominal_in_space(mode, conditions, robot)  # type: ignore[arg-type]
     return named(name, mode, conditions, robot)  # type: ignore[arg-type]
 
@@ -68,5 +99,6 @@ def read_scenario(data: Mapping[str, Any]) -> AnyScenario:
     Raises:
         ValueError: If a key is unknown, or a value of the wrong type or out of range.
     """
-    spatial = isinstance(data, Mapping) and in_space(data.get("mode", ""))
-    return SpatialScenario.from_dict(data) if spatial else Scenario.from_dict(data)
+    mode = data.get("mode", "") if isinstance(data, Mapping) else ""
+    scenario: AnyScenario = kind_of(mode).from_dict(data)
+    return scenario

@@ -29,6 +29,8 @@ class Nominal:
         joint_angle_noise: The same of the joint angles, rad.
         rate_noise: The same of the rates of tail and joints, rad/s.
         thruster_dead_band: Commands below this make no force, N.
+        joint_time_constant: By what the references of joints lag behind the angles that a policy
+            commands, s; 0 if the task moves the joints.
     """
 
     robot: Any
@@ -45,12 +47,15 @@ class Nominal:
     joint_angle_noise: float = 0.0
     rate_noise: float = 0.0
     thruster_dead_band: float = 0.0
+    joint_time_constant: float = 0.0
 
 
-def nominal_under(robot: Any, conditions: Conditions) -> Nominal:
+def nominal_under(robot: Any, conditions: Conditions, joint_time_constant: float = 0.0) -> Nominal:
     """What a controller may know of a robot, nominal as given, under some conditions."""
-    names = [field.name for field in fields(Nominal) if field.name != "robot"]
-    return Nominal(robot, **{name: getattr(conditions, name) for name in names})
+    given = ("robot", "joint_time_constant")
+    names = [field.name for field in fields(Nominal) if field.name not in given]
+    known = {name: getattr(conditions, name) for name in names}
+    return Nominal(robot, **known, joint_time_constant=joint_time_constant)
 
 
 def shared_nominal(scenarios: Iterable[Any]) -> Nominal:

@@ -8,13 +8,22 @@ from typing import Any
 
 import numpy as np
 
+from usm_gym.manipulator import Manipulator
 from usm_gym.robots import AnyRobot, name_of, robot_of, spatial_robot_of
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import Conditions, conditions_of
-from usm_gym.task.modes import AnyMode, AnyScenario, in_space, named_of, presets_of, sample_of
+from usm_gym.task.modes import (
+    AnyMode,
+    AnyScenario,
+    in_space,
+    kind_of,
+    named_of,
+    of_head,
+    presets_of,
+    sample_of,
+)
 from usm_gym.task.nominal import Nominal
 from usm_gym.task.scenario import Scenario
-from usm_gym.task.spatial_scenario import SpatialScenario
 
 
 @dataclass(frozen=True)
@@ -24,12 +33,17 @@ class ModeSampler:
     Attributes:
         mode: The mode.
         conditions: Their conditions.
-        body: The robot.
+        robot: The robot.
     """
 
     mode: AnyMode
     conditions: Conditions
-    body: AnyRobot
+    robot: AnyRobot
+
+    @property
+    def body(self) -> AnyRobot | Manipulator:
+        """The robot as a world takes it: steered, where the policy moves the joints."""
+        return Manipulator(self.robot) if of_head(self.mode) else self.robot
 
     @property
     def nominal(self) -> Nominal:
@@ -38,7 +52,7 @@ class ModeSampler:
 
     def draw(self, stream: np.random.Generator) -> AnyScenario:
         """Draw a scenario."""
-        return sample_of(self.mode, self.conditions, stream, name_of(self.body))
+        return sample_of(self.mode, self.conditions, stream, name_of(self.robot))
 
     def choose(self, wanted: Any) -> AnyScenario:
         """The scenario of a name, of a dict, or itself; a dict without robot has this one.
@@ -46,13 +60,13 @@ class ModeSampler:
         Raises:
             ValueError: If there is none, or it is of another robot or mode.
         """
-        robot = name_of(self.body)
+        robot = name_of(self.robot)
         if isinstance(wanted, str):
             return named_of(wanted, self.mode, self.conditions, robot)
-        kind: Any = SpatialScenario if in_space(self.mode) else Scenario
+        kind = kind_of(self.mode)
         if not isinstance(wanted, kind):
             known = {"robot": robot}
-            if in_space(self.mode):  # in the plane, a dict without mode is of operation mode
+            if kind is not Scenario:  # there, a dict without mode is of operation mode
                 known["mode"] = self.mode
             wanted = kind.from_dict(known | wanted if isinstance(wanted, dict) else wanted)
         scenario: AnyScenario = wanted

@@ -13,7 +13,7 @@ from usm_gym.kernels.compile import compiled, piece
 from usm_gym.plant.spatial.layout import *
 from usm_gym.plant.spatial.posture import centre_of_mass, mass_velocity, place_links
 from usm_gym.plant.spatial.rotation import axes_of, cross, out_of, product
-from usm_gym.sensors import Entry, Layout
+from usm_gym.sensors import Entry, Layout, put
 
 _OF_JOINTS = "joint i turns link i + 1 against link i, right-handed"
 
@@ -118,13 +118,6 @@ class SpatialLayout(Layout):
 # The number of each entry in the order of the table, by name.
 _NAMES = [entry.name for entry in SpatialLayout(joints=1, thrusters=5).entries]
 SPATIAL_ENTRY: Any = namedtuple("SPATIAL_ENTRY", _NAMES)(*range(len(_NAMES)))
-
-
-@piece
-def put(observation, table, entry, index, value):
-    """Fill in one number of an observation from its physical value."""
-    k = table.starts[entry] + index
-    observation[k] = value * table.gain[k]
 
 
 @piece

@@ -11,8 +11,6 @@ from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter
 from usm_gym.support.results import Part
 from usm_gym.support.validation import require, validated
 from usm_gym.task.modes import AnyScenario, read_scenario
-from usm_gym.task.scenario import Scenario
-from usm_gym.task.spatial_scenario import SpatialScenario
 
 
 @validated
@@ -35,7 +33,7 @@ def stored(value: Any) -> AnyScenario | OtherScenario:
     Raises:
         UsageError: If it is not a scenario.
     """
-    if isinstance(value, (Scenario, SpatialScenario, OtherScenario)):
+    if isinstance(value, AnyScenario | OtherScenario):
         return value
     if isinstance(value, Mapping):
         other = "world" in value

@@ -14,7 +14,8 @@ from support.episodes import NOISY
 import usm_gym
 
 PLANE, SPACE = "USM-Operation-v0", "USM-Operation3D-v0"
-IDS = (PLANE, "USM-Torpedo-v0", SPACE, "USM-Torpedo3D-v0")
+HEADS = ("USM-Head-v0", "USM-Head3D-v0")
+IDS = (PLANE, "USM-Torpedo-v0", SPACE, "USM-Torpedo3D-v0", *HEADS)
 both = pytest.mark.parametrize("id", [PLANE, SPACE])
 
 
@@ -22,6 +23,8 @@ def keys(env):
     """The keys of an info."""
     plane = len(env.unwrapped.world.axes) == 2
     axes, angles = ("xy", ["heading"]) if plane else ("xyz", ["pitch", "yaw", "roll"])
+    if plane and "direction" in env.unwrapped.world.attitude:
+        angles = ["direction", *angles]
     errors = [f"{kind}_{axis}" for kind in ("error", "max_error") for axis in axes]
     return {*errors, *(f"{angle}_error" for angle in angles), "thrust_effort", "diverged"}
 
@@ -33,7 +36,8 @@ def actions(env, steps, size=1.0):
 
 def rollout(env, steps, seed=0, policy_id="sta"):
     """Observations, rewards and errors of a seeded episode under a policy."""
-    policy = usm_baselines.make(policy_id, env)
+    of_head = env.unwrapped.world.actions > env.unwrapped.world.thrusters
+    policy = usm_baselines.make(f"rates-{policy_id}" if of_head else policy_id, env)
     observation, info = env.reset(seed=seed)
     state, record = None, [(observation, 0.0, info)]
     for _ in range(steps):

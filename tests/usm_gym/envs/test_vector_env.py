@@ -59,6 +59,7 @@ def test_every_autoreset_mode_is_gymnasiums_to_the_bit(mode):
     [
         *((ID, conditions, threads) for conditions in ("basin", "sea") for threads in (1, 2)),
         *((SPACE, "basin", 1), (SPACE, "sea", 2), ("USM-Torpedo3D-v0", "sea", 1)),
+        *(("USM-Head-v0", "sea", 2), ("USM-Head3D-v0", "sea", 1)),
     ],
 )
 def test_in_basin_and_sea_many_have_the_bits_of_single_environments(id, conditions, threads):

@@ -55,6 +55,8 @@ class SpatialPlant(NamedTuple):
         substeps: Physics steps in a control period.
         shifts: Largest number of changes of the joint references in any episode.
         sinusoids: Largest number of sinusoids in the water's velocity in any episode.
+        steering: How a policy steers the joints, if it does: this and what follows as in
+            `plant.steering.Steering`.
     """
 
     links: int
@@ -72,6 +74,11 @@ class SpatialPlant(NamedTuple):
     substeps: int
     shifts: int
     sinusoids: int
+    steering: int
+    joint_time_constant: float
+    joint_decay: float
+    joint_rate_limit: float
+    joint_angle_limit: float
 
 
 @piece

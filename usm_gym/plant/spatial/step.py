@@ -9,6 +9,7 @@ from usm_gym.plant.spatial.chain import accelerate
 from usm_gym.plant.spatial.layout import *
 from usm_gym.plant.spatial.links import kinematics, load_attitude, load_base, store_base
 from usm_gym.plant.spatial.rotation import turned
+from usm_gym.plant.steering import steered_torque
 from usm_gym.plant.thrusters import mean_force
 from usm_gym.plant.water import move_water
 
@@ -36,8 +37,11 @@ def joint_torques(block, like, wide, stride, plant, asked_pan, asked_tilt):
     on_rate = k_d + lead * k_p
     on_acceleration = lead * (k_d - lead * k_p)
     for j in range(0, links - 1, stride):
-        wanted = asked_pan * load(block, row_of(PAN_SHARE, links) + j, wide)
-        wanted += asked_tilt * load(block, row_of(TILT_SHARE, links) + j, wide)
+        if plant.steering > 0:
+            wanted = steered_torque(block, wide, plant, j, k_p, k_d)
+        else:
+            wanted = asked_pan * load(block, row_of(PAN_SHARE, links) + j, wide)
+            wanted += asked_tilt * load(block, row_of(TILT_SHARE, links) + j, wide)
         held = k_p * load(block, row_of(PHI, links) + j, wide)
         held += on_rate * load(block, row_of(PHI_DOT, links) + j, wide)
         held -= on_acceleration * load(block, row_of(PHI_DDOT, links) + j, wide)
