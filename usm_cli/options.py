@@ -16,7 +16,7 @@ import joblib
 from usm_gym.support.files import check_writable, parse_json
 from usm_gym.support.validation import UsageError, require
 from usm_gym.task.conditions import Conditions, conditions_of
-from usm_gym.task.modes import presets_of
+from usm_gym.task.modes import ALL_MODES, presets_of
 
 # How long a cluster may take to accept a connection, s.
 CONNECTION_TIME = 10.0
@@ -39,6 +39,12 @@ def check_installed(what: str, extra: str, *modules: str) -> None:
         if find_spec(module) is None:
             package = module.replace("_", "-")
             raise UsageError(f"{what} needs {package}: pip install 'usm-gym[{extra}]'")
+
+
+def add_mode(parser: argparse.ArgumentParser, default: str | None = "operation") -> None:
+    """Add the option for the mode of sampled scenarios."""
+    words = f"{', '.join(ALL_MODES)} (default: operation)"
+    parser.add_argument("--mode", choices=ALL_MODES, default=default, metavar="M", help=words)
 
 
 def add_computing(parser: argparse.ArgumentParser, default: str = "1") -> None:

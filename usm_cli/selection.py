@@ -20,14 +20,14 @@ from usm_baselines.benchmark.scoring import (
 from usm_baselines.contender import Contender
 from usm_baselines.tiers import TIERS, competitors, short_list
 
-from usm_cli.options import add_computing, computing, count, parse_conditions
+from usm_cli.options import add_computing, add_mode, computing, count, parse_conditions
 from usm_cli.terminal import progress_bar
 from usm_gym.evaluation import BATCH, Evaluation
 from usm_gym.suites import NAMES, suite, unseen
 from usm_gym.support.files import read_json
 from usm_gym.support.validation import explaining, require
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.modes import ALL_MODES, AnyMode, AnyScenario, presets_of, read_scenario
+from usm_gym.task.modes import AnyMode, AnyScenario, presets_of, read_scenario
 from usm_gym.task.nominal import shared_nominal
 
 # Stands for all competitors among the names of policies.
@@ -64,7 +64,7 @@ def add_scenarios(parser: argparse.ArgumentParser, single: bool = False) -> None
         parser.set_defaults(episodes=None)
     else:
         add("--episodes", type=int, metavar="N", help="number of sampled scenarios (default: 50)")
-    add("--mode", choices=ALL_MODES, help="mode of sampled scenarios (default: operation)")
+    add_mode(parser, default=None)
     add(
         "--conditions",
         metavar="C",

@@ -25,6 +25,8 @@ from usm_gym.support.results import Part, Provenance, Result
 from usm_gym.support.seeding import EVALUATION, stream
 from usm_gym.support.validation import Count, Number, require, validated
 from usm_gym.task.conditions import FIELD, Conditions
+from usm_gym.task.head_path import HeadPath
+from usm_gym.task.head_scenario import HeadEpisode
 from usm_gym.task.modes import AnyMode, AnyScenario, presets_of, sample_of
 from usm_gym.task.sampling import named, sample
 from usm_gym.task.scenario import Path as Track
@@ -178,7 +180,7 @@ def plant_timing(
     conditions = replace(still_water(mode), control_period=period, physics_step=step)
     simulation = Simulation(resting(size, conditions, robot, mode), threads)
     start = simulation.snapshot()
-    action = np.zeros((size, simulation.world.thrusters), np.float32)
+    action = np.zeros((size, simulation.world.actions), np.float32)
 
     def run() -> None:
         if simulation.count[0] == simulation.steps[0]:
@@ -212,6 +214,8 @@ def resting(
 
 def at_rest(scenario: AnyScenario) -> AnyScenario:
     """A scenario whose reference stays where it starts."""
+    if isinstance(scenario, HeadEpisode):
+        return replace(scenario, path=HeadPath(centre=tuple(scenario.start.tolist())))
     if isinstance(scenario, SpatialScenario):
         return replace(scenario, path=SpatialPath(speed=0.0, sway=0.0, heave=0.0))
     return replace(scenario, path=Track(speed=0.0, amplitude=0.0))

@@ -25,6 +25,10 @@ class Family(Enum):
         "Weigh error against thrust on a model of the robot, with or without its joint motion.",
     )
     ADAPTIVE = "Adaptive", "Identify the robot and the current while it swims."
+    HEAD = (
+        "For the head",
+        "Move the joints so that the head follows its path, over a law that holds the body.",
+    )
     LEARNED = (
         "Learned",
         "Networks trained in simulation: alone, beside a law, or telling a law what to believe.",

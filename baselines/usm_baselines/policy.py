@@ -18,7 +18,7 @@ from usm_baselines.estimation.navigator import ACCELERATION_NOISE, DISTURBANCE_N
 from usm_baselines.estimation.plant_navigator import PlantNavigator
 from usm_baselines.estimation.prediction import Predictor, tell
 from usm_baselines.signals import Array, Signals, act, model_of, sense, shared_size, signals_of
-from usm_baselines.space import Gain, declared
+from usm_baselines.space import Gain, chosen_gains
 from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
@@ -49,6 +49,22 @@ def corrected(signals: Signals, correction: Array | None) -> Signals:
         rate=signals.rate + correction[:, :, 1],
         disturbance=signals.disturbance + correction[:, :, 2],
     )
+
+
+def as_batch(observation: ArrayLike, numbers: int) -> tuple[NDArray[np.float32], bool]:
+    """A batch of observations, (batch, numbers), and whether it was given as a single one.
+
+    Raises:
+        ValueError: If its shape is wrong.
+    """
+    seen = np.asarray(observation, np.float32)
+    require(
+        seen.ndim in (1, 2) and seen.shape[-1] == numbers,
+        "the observation's shape",
+        seen.shape,
+        f"({numbers},) or (batch, {numbers})",
+    )
+    return seen.reshape(-1, numbers), seen.ndim == 1
 
 
 class ScriptedPolicy:
@@ -102,14 +118,8 @@ class ScriptedPolicy:
             ValueError: If a gain is not finite, is negative, or is 0 and has to be positive; or if
                 the law foresees the motion and nothing foresees that of the robot.
         """
-        chosen = self.Gains(**gains)
-        for name, gain in declared(self.Gains).items():
-            value = getattr(chosen, name)
-            number = isinstance(value, (int, float)) and np.isfinite(value) and value >= 0
-            require(number, name, value, "a finite number >= 0")
-            require(value > 0 or not gain.positive, name, value, "a number > 0")
         self.nominal = nominal
-        self.gains = self.Gains(*map(float, chosen))
+        self.gains = chosen_gains(self.Gains, gains)
         self._world, self._model = world_of(nominal.robot), model_of(nominal, lag)
         # Before the law's own numbers stand those that all laws share.
         self._shared = shared_size(self._model)
@@ -206,17 +216,10 @@ class ScriptedPolicy:
         """
         fitting = correction is None or self.predictor is not None
         require(fitting, "correction", correction, "None for this law, which has no predictor")
-        seen = np.asarray(observation, np.float32)
-        numbers = self._model.scale.size
-        require(
-            seen.ndim in (1, 2) and seen.shape[-1] == numbers,
-            "the observation's shape",
-            seen.shape,
-            f"({numbers},) or (batch, {numbers})",
-        )
-        known = self.perceive(seen.reshape(-1, numbers), state, episode_start)
+        seen, single = as_batch(observation, self._model.scale.size)
+        known = self.perceive(seen, state, episode_start)
         action, new_state = self.decide(known, correction)
-        return (action, new_state) if seen.ndim == 2 else (action[0], new_state)
+        return (action[0] if single else action), new_state
 
     def perceive(
         self, observation: NDArray[np.float32], state: Array | None, start: ArrayLike | None

@@ -1,4 +1,4 @@
-"""Policies by name."""
+"""Policies by name: the mechanism; `usm_baselines.policies` registers those of this package."""
 
 from __future__ import annotations
 
@@ -11,26 +11,6 @@ from typing import Any
 
 from usm_baselines.families import Family
 from usm_baselines.gains import FOLDERS, TUNED, GainsFile, read_gains
-from usm_baselines.laws.adaptive_lqg import AdaptiveLQG
-from usm_baselines.laws.disturbance_observer import DisturbanceObserver
-from usm_baselines.laws.generalised_super_twisting import (
-    AdaptiveGeneralisedSuperTwisting,
-    GeneralisedSuperTwisting,
-)
-from usm_baselines.laws.heading import Heading
-from usm_baselines.laws.incremental import Incremental
-from usm_baselines.laws.informed_lqg import InformedLQG
-from usm_baselines.laws.joint_lqg import JointLQG
-from usm_baselines.laws.ladrc import LADRC
-from usm_baselines.laws.limited_mpc import LimitedMPC
-from usm_baselines.laws.lqg import LQG
-from usm_baselines.laws.mpc import MPC
-from usm_baselines.laws.oracle import Oracle
-from usm_baselines.laws.pd import PD, SPACES
-from usm_baselines.laws.pid import PID
-from usm_baselines.laws.sliding_mode import SlidingMode
-from usm_baselines.laws.super_twisting import SuperTwisting
-from usm_baselines.laws.zero import Zero
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.space import Space, space_of
 from usm_gym.policy import Policy
@@ -55,6 +35,7 @@ class Registration:
         note: What to bear in mind about its scores; empty if nothing.
         tuned_for: The preset of conditions for which its gains are tuned; empty if for none.
         family: The family under which it is listed; None for a policy of the user's own.
+        moves_joints: Whether it moves the joints, too, and so is one for the head.
     """
 
     factory: Callable[..., Policy]
@@ -66,6 +47,7 @@ class Registration:
     note: str = ""
     tuned_for: str = ""
     family: Family | None = None
+    moves_joints: bool = False
 
 
 _entries: dict[str, Registration] = {}
@@ -83,6 +65,7 @@ def register(
     note: str = "",
     tuned_for: str = "",
     family: Family | None = None,
+    moves_joints: bool = False,
 ) -> None:
     """Register a policy, and the same with shipped gains, as `ID-tuned` or another of `FOLDERS`.
 
@@ -100,13 +83,14 @@ def register(
         note: What to bear in mind about its scores.
         tuned_for: The preset of conditions that it was trained or tuned for.
         family: The family under which it is listed.
+        moves_joints: Whether it moves the joints, too.
 
     Raises:
         ValueError: If the name is taken.
     """
     require(id not in _entries, "id", id, "a name that is not taken")
     chosen = _declared_space(factory) if space is None else space
-    about = (told, on_request, privileged, note, tuned_for, family)
+    about = (told, on_request, privileged, note, tuned_for, family, moves_joints)
     _entries[id] = Registration(factory, summary, chosen, *about)
     for suffix, folder in FOLDERS.items():
         shipped = TUNED / folder / f"{id}.json"
@@ -156,6 +140,7 @@ def tuned(file: GainsFile) -> Registration:
         note=base.note,
         tuned_for=file.tuned_for,
         family=base.family,
+        moves_joints=base.moves_joints,
     )
 
 
@@ -231,169 +216,3 @@ def nominal_knowledge(env: Any) -> Nominal:
     require(len(set(known)) == 1, "nominal knowledge", kinds, "one of all robots")
     nominal: Nominal = known[0]
     return nominal
-
-
-# What laws are told besides the measured position and the reference.
-LAG = "lag"
-NAVIGATED = "lag, noise, delays, nominal plant"
-BODY, FORESIGHT = "lag, noise, straight body", "lag, noise, nominal plant, joint references"
-
-register(
-    "sta",
-    SuperTwisting,
-    "the paper's adaptive super-twisting law with its gains, made stable at this control rate",
-    family=Family.SLIDING_MODE,
-)
-register(
-    "sta-explicit",
-    partial(SuperTwisting, implicit=False),
-    "the same law stepped as the paper has it, which needs a far higher control rate",
-    space={},
-    family=Family.SLIDING_MODE,
-)
-register(
-    "sta-shtessel",
-    partial(SuperTwisting, fall=1.0),
-    "super-twisting whose gains also fall again (Shtessel et al.)",
-    family=Family.SLIDING_MODE,
-)
-register("pd", PD, "the paper's PD with its gains, as a force", family=Family.PD)
-register(
-    "pd-mass",
-    partial(PD, reading="mass"),
-    "the same PD read as an acceleration: times the mass, with feedforward",
-    space=SPACES["mass"],
-    family=Family.PD,
-)
-register(
-    "pd-observer",
-    partial(PD, reading="observer"),
-    "the same PD in place of super-twisting, on the paper's observer",
-    space=SPACES["observer"],
-    family=Family.PD,
-)
-register("pid", PID, "PID with filtered derivative and anti-windup", family=Family.PD)
-register(
-    "ladrc",
-    LADRC,
-    "linear active-disturbance rejection: extended-state observer and pole placement",
-    family=Family.OBSERVER,
-)
-register(
-    "smc",
-    SlidingMode,
-    "sliding mode with boundary layer and integral action",
-    family=Family.SLIDING_MODE,
-)
-register(
-    "gsta",
-    GeneralisedSuperTwisting,
-    "generalised super-twisting with constant gains, on the paper's observer",
-    family=Family.SLIDING_MODE,
-)
-register(
-    "agsta",
-    AdaptiveGeneralisedSuperTwisting,
-    "generalised super-twisting whose gains adapt as the paper's do",
-    family=Family.SLIDING_MODE,
-)
-# Laws that estimate the disturbance from the applied force, once more with the lagging force.
-for _id in ("sta", "sta-shtessel", "pd", "pd-mass", "pd-observer", "ladrc", "smc", "gsta", "agsta"):
-    _law = _entries[_id]
-    register(
-        f"{_id}-lag",
-        partial(_law.factory, lag=True),
-        f"{_id}, told the thrusters' lag",
-        told=LAG,
-        space=_law.space,
-        on_request=True,
-        family=_law.family,
-    )
-# The paper's first case (9), and others with it: position and velocity from the navigator.
-for _id in ("sta", "pd", "pid", "smc"):
-    _law = _entries[_id]
-    register(
-        f"{_id}-navigator",
-        partial(_law.factory, navigated=True),
-        f"{_id} on the navigator's position and velocity",
-        told=NAVIGATED,
-        space={name: span for name, span in _law.space.items() if name != "observer_gain"},
-        on_request=True,
-        family=_law.family,
-    )
-register(
-    "dob",
-    DisturbanceObserver,
-    "disturbance observer: inverse of the nominal model behind a filter, pole placement",
-    told=NAVIGATED,
-    family=Family.OBSERVER,
-)
-register(
-    "indi",
-    Incremental,
-    "incremental nonlinear dynamic inversion: the acceleration's error corrects the force",
-    told=NAVIGATED,
-    family=Family.OBSERVER,
-)
-register(
-    "lqg",
-    LQG,
-    "Kalman filter with disturbance, linear-quadratic regulator; joints taken as still",
-    told=BODY,
-    family=Family.OPTIMAL,
-)
-register(
-    "lqg-joints",
-    JointLQG,
-    "lqg that foresees what the joint motion will do",
-    told=FORESIGHT,
-    family=Family.OPTIMAL,
-)
-register(
-    "adaptive",
-    AdaptiveLQG,
-    "lqg-joints that identifies coefficients, current and thruster gains on the way",
-    told=FORESIGHT,
-    on_request=True,
-    family=Family.ADAPTIVE,
-)
-register(
-    "informed",
-    InformedLQG,
-    "lqg-joints, told every constant of the episode: all that identification could bring",
-    told="all constants of the episode",
-    privileged=True,
-    family=Family.REFERENCE,
-)
-register(
-    "mpc",
-    MPC,
-    "model-predictive control that foresees the joint motion",
-    told=FORESIGHT,
-    family=Family.OPTIMAL,
-)
-register(
-    "mpc-limits",
-    LimitedMPC,
-    "mpc that also plans with the thrusters' limits",
-    told=FORESIGHT,
-    on_request=True,
-    family=Family.OPTIMAL,
-)
-register(
-    "oracle",
-    Oracle,
-    "true state, exact plant, the future: the limit",
-    told="everything",
-    privileged=True,
-    family=Family.REFERENCE,
-)
-register("zero", Zero, "no thrust", family=Family.REFERENCE)
-register(
-    "heading",
-    Heading,
-    "the heading controller that all laws share, alone",
-    space={},
-    on_request=True,
-    family=Family.REFERENCE,
-)

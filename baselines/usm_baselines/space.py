@@ -55,6 +55,8 @@ SPATIAL_RANGES = {
     "observer_gain": Range(1e-4, 100.0, "m/s^3"),
     "horizon": Range(0.1, 1.5, "s"),
 }
+# Gains that have no effect in space, where attitude controllers look ahead anyway.
+PLANAR = ("heading_lead",)
 
 
 class Gain(float):
@@ -102,10 +104,27 @@ def declared(gains: type[Any]) -> dict[str, Gain]:
     return {name: gains._field_defaults[name] for name in gains._fields}
 
 
+def chosen_gains(kind: type[Any], given: Mapping[str, float]) -> Any:
+    """The gains of a law, a `NamedTuple`, some of which are given by name.
+
+    Raises:
+        ValueError: If one is not finite, is negative, or is 0 and has to be positive.
+    """
+    chosen = kind(**given)
+    for name, gain in declared(kind).items():
+        value = getattr(chosen, name)
+        number = isinstance(value, (int, float)) and math.isfinite(value) and value >= 0
+        require(number, name, value, "a finite number >= 0")
+        require(value > 0 or not gain.positive, name, value, "a number > 0")
+    return kind(*map(float, chosen))
+
+
 def in_mode(space: Space, mode: str) -> Space:
     """The space in which the gains of a law are tuned in a mode, in the plane or in space."""
-    others = SPATIAL_RANGES if in_space(mode) else {}
-    return {name: others.get(name, span) for name, span in space.items()}
+    if not in_space(mode):
+        return space
+    spans = {name: SPATIAL_RANGES.get(name, span) for name, span in space.items()}
+    return {name: span for name, span in spans.items() if name not in PLANAR}
 
 
 def space_of(gains: type[Any], **others: Range) -> Space:

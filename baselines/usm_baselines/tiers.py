@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from usm_baselines.registry import Registration, entry, ids
 from usm_gym.task.conditions import IN_SPACE, Conditions, preset_of
-from usm_gym.task.modes import AnyMode, in_space
+from usm_gym.task.modes import AnyMode, in_space, of_head
 
 # Presets for which laws are tuned anew. To all other conditions go the policies that are meant for
 # `field`, in space those for `field` there.
@@ -41,11 +41,14 @@ def meant_for(conditions: Conditions, mode: AnyMode = "operation") -> list[str]:
 
     For a tier they are those that are tuned or trained for it, the paper's two, and those that are
     given true state and have no gains to tune; for all other conditions all but those that are
-    tuned for a tier.
+    tuned for a tier. Laws for the head are meant for all: their laws for the body have the gains
+    that fit.
     """
     tier = tier_of(conditions, mode)
 
     def meant(id: str, policy: Registration) -> bool:
+        if policy.moves_joints or of_head(mode):
+            return policy.moves_joints and of_head(mode) and policy.tuned_for in ("", tier)
         if tier not in TIERS:
             return policy.tuned_for not in TIERS
         limit = policy.privileged and not policy.space and not policy.tuned_for
@@ -59,7 +62,7 @@ def short_list(conditions: Conditions, mode: AnyMode = "operation") -> list[str]
 
     For a tier they are all that are meant for it, as every law has only one set of gains there.
     """
-    if tier_of(conditions, mode) not in TIERS:
+    if tier_of(conditions, mode) not in TIERS and not of_head(mode):
         return list(SHORT_LIST)
     return competitors(conditions, mode)
 

@@ -42,7 +42,7 @@ def test_the_scripted_policies_are_there() -> None:
     assert {*SCRIPTED, *RIVALS} <= set(usm_baselines.ids())
     assert len(set(usm_baselines.ids())) == len(usm_baselines.ids())
     for id in usm_baselines.ids():
-        law = registry.base_of(id)
+        law = registry.base_of(id).rpartition("-")[2]
         assert registry.entry(id).privileged == (law in ("oracle", "informed"))
         assert "\n" not in registry.entry(id).summary
 
@@ -111,6 +111,7 @@ def test_a_factory_is_given_nominal_knowledge_and_gains_only() -> None:
         "joint_angle_noise",
         "rate_noise",
         "thruster_dead_band",
+        "joint_time_constant",
     }
     assert nominal.robot == env.unwrapped.robot
     assert nominal.control_period == 0.02

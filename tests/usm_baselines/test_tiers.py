@@ -9,10 +9,11 @@ from support.tiers import TIERS, gains_file, register_with_tiers
 from usm_baselines import registry
 from usm_baselines.contender import contender
 from usm_baselines.gains import FOLDERS
-from usm_baselines.tiers import PAPER, meant_for, tier_of
+from usm_baselines.tiers import PAPER, meant_for, short_list, tier_of
 
 from usm_gym.support.validation import UsageError
 from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS, Conditions
+from usm_gym.task.modes import presets_of
 from usm_gym.task.sampling import named
 
 
@@ -67,5 +68,17 @@ def test_all_other_conditions_are_for_all_but_policies_of_tiers(conditions: Cond
     assert tier_of(conditions) == "field"
     left_out = [id for id in registry.ids() if id not in meant_for(conditions)]
     others = [tier for tier in TIERS if tier != "field"]
-    assert all(registry.entry(id).tuned_for in others for id in left_out)
+    entries = [registry.entry(id) for id in left_out]
+    assert all(entry.tuned_for in others or entry.moves_joints for entry in entries)
     assert {"mine-basin", "mine-sea"} <= set(left_out)
+
+
+@pytest.mark.parametrize("mode", ["head", "head3d"])
+@pytest.mark.parametrize("conditions", ["field", "basin"])
+def test_laws_for_the_head_meet_all_conditions_of_the_head_and_no_others(mode, conditions) -> None:
+    preset = presets_of(mode)[conditions]
+    laws = {id for id in registry.ids() if registry.entry(id).moves_joints}
+    assert set(meant_for(preset, mode)) == laws
+    assert {"rates-sta", "whole-lqg-joints"} <= set(short_list(preset, mode)) < laws
+    for other in ("operation", "operation3d"):
+        assert not laws & set(meant_for(presets_of(other)[conditions], other))  # type: ignore[arg-type]

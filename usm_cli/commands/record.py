@@ -11,7 +11,7 @@ import gymnasium as gym
 from usm_agents.policies import named
 from usm_baselines.contender import Contender
 
-from usm_cli.options import check_installed, count, parse_conditions
+from usm_cli.options import add_mode, check_installed, count, parse_conditions
 from usm_cli.selection import POLICIES
 from usm_cli.terminal import output_console, progress_bar
 from usm_gym.dataset import new_dataset, record, reset_seeds
@@ -21,7 +21,6 @@ from usm_gym.registration import id_of
 from usm_gym.support.provenance import provenance
 from usm_gym.support.validation import UsageError, in_one_line
 from usm_gym.task.conditions import PRESETS
-from usm_gym.task.modes import ALL_MODES
 
 DESCRIPTION = """\
 Write the episodes of a policy as a dataset of Minari, for offline learning: observations, actions,
@@ -50,7 +49,7 @@ def add_to(subparsers: Any) -> None:
     add = parser.add_argument
     add("policy", metavar="POLICY", help="name of a policy")
     add("--episodes", type=int, metavar="N", help="number of episodes (default: 50)")
-    add("--mode", choices=ALL_MODES, default="operation", help="default: operation")
+    add_mode(parser)
     add("--conditions", metavar="C", help=f"{', '.join(PRESETS)}, or JSON (default: field)")
     add("--seed", type=int, metavar="S", help="seed of the scenarios (default: 0)")
     add("--output", metavar="ID", required=True, help="id of the dataset: NAMESPACE/NAME-vN")

@@ -9,14 +9,20 @@ from typing import Any
 
 from usm_baselines.gains import Budget
 
-from usm_cli.options import add_computing, check_installed, computing, count, parse_conditions
+from usm_cli.options import (
+    add_computing,
+    add_mode,
+    check_installed,
+    computing,
+    count,
+    parse_conditions,
+)
 from usm_cli.terminal import output_console, progress_bar
 from usm_gym.support.files import check_writable, holding, write_json
 from usm_gym.support.provenance import provenance
 from usm_gym.support.text import figures
 from usm_gym.task.conditions import PRESETS
 from usm_gym.task.metrics import VARIATION_WEIGHT
-from usm_gym.task.modes import ALL_MODES
 
 DESCRIPTION = """\
 Search for the gains of a policy with the smallest objective: the mean over scenarios of the largest
@@ -49,7 +55,7 @@ def add_to(subparsers: Any) -> None:
     add("--trials", type=int, metavar="N", help="sets of gains to try (default: 300)")
     add("--episodes", type=int, metavar="N", help="scenarios per set (default: 50)")
     add("--weight", type=float, metavar="W", help="mm per N/s of variation (default: 0.002)")
-    add("--mode", choices=ALL_MODES, default="operation", help="default: operation")
+    add_mode(parser)
     add("--conditions", metavar="C", help=f"{', '.join(PRESETS)}, or JSON (default: field)")
     add("--seed", type=int, metavar="S", help="seed of scenarios and search (default: 0)")
     add("--output", metavar="FILE", help="file of gains and provenance (default: POLICY.json)")

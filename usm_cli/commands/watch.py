@@ -27,8 +27,9 @@ from usm_gym.task.metrics import MAX_ERROR, axes_of
 DESCRIPTION = """\
 Watch a policy in an episode, or two or three, one above the other, in the same scenario with the
 same noise, in a window (Escape closes it) or in a film. The picture shows the robot and the shape
-that it should have, the jets of its thrusters, the current, the centre of mass and its goal, and
-the error, magnified and over time. Needs the extra `render`.
+that it should have, if one is asked for, the jets of its thrusters, the current, the centre of
+mass, the goal of what follows the path, and the error, magnified and over time. Needs the extra
+`render`.
 """
 EXAMPLES = f"""\
 {POLICIES}

@@ -26,13 +26,13 @@ from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import IN_SPACE
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
-from usm_gym.task.modes import AnyScenario
+from usm_gym.task.modes import AnyScenario, of_head
 from usm_gym.task.nominal import shared_nominal
 
 
 @dataclass(frozen=True)
 class Board:
-    """The suites whose scores stand in one leaderboard: those in the plane, or those in space.
+    """The suites of the body whose scores stand in one leaderboard: in the plane, or in space.
 
     Attributes:
         main: The suite that counts; the others are named after it, but for those of other modes.
@@ -52,8 +52,9 @@ class Board:
 
     def suites(self) -> dict[str, list[AnyScenario]]:
         """The frozen suites, and the control."""
-        named = [name for name in NAMES if (IN_SPACE in name) == (IN_SPACE in self.main)]
-        chosen = {name: suite(name) for name in named}
+        here = [name for name in NAMES if (IN_SPACE in name) == (IN_SPACE in self.main)]
+        known = {name: suite(name) for name in here}
+        chosen = {name: them for name, them in known.items() if not of_head(them[0].mode)}
         chosen[self.still] = [
             replace(scenario, conditions=replace(scenario.conditions, motion=False))
             for scenario in chosen[self.main]

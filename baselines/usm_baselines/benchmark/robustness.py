@@ -18,8 +18,10 @@ from usm_baselines.contender import Contender
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.results import Provenance, Result
 from usm_gym.support.validation import Number, require, validated
-from usm_gym.task.modes import AnyScenario
+from usm_gym.task.modes import AnyScenario, of_head
 from usm_gym.task.nominal import shared_nominal
+from usm_gym.task.scenario import Scenario
+from usm_gym.task.spatial_scenario import SpatialScenario
 from usm_gym.task.stored_scenario import StoredScenarios
 
 
@@ -83,12 +85,20 @@ def spread(field: str) -> Callable[[AnyScenario, float], AnyScenario]:
 
 def speed(scenario: AnyScenario, factor: float) -> AnyScenario:
     """Filters the joint references more or less."""
-    return scenario.bending(faster=factor)
+    return _moved_by_task(scenario).bending(faster=factor)
 
 
 def amplitude(scenario: AnyScenario, factor: float) -> AnyScenario:
     """Bends the head more or less."""
-    return scenario.bending(further=factor)
+    return _moved_by_task(scenario).bending(further=factor)
+
+
+def _moved_by_task(scenario: AnyScenario) -> Scenario | SpatialScenario:
+    """A scenario in which the task moves the joints; others are refused."""
+    allowed = "a quantity other than amplitude and speed: here the policy moves the joints"
+    require(not of_head(scenario.mode), "mode", scenario.mode, allowed)
+    assert isinstance(scenario, (Scenario, SpatialScenario))
+    return scenario
 
 
 def rate(scenario: AnyScenario, frequency: float) -> AnyScenario:

@@ -48,6 +48,7 @@ class OracleGains(NamedTuple):
     )
     horizon: float = Gain(0.3, "s", "how far it plans", positive=True)
     heading_gain: float = HEADING_GAIN
+    heading_lead: float = Gain(0.0, "s", "how far ahead the heading error is taken, in the plane")
 
 
 class Oracle(PrivilegedPolicy):
@@ -102,23 +103,27 @@ class Oracle(PrivilegedPolicy):
         size, periods, thrusters = plan.shape
         error, thrust = np.empty((2, size, periods, self._model.axes))
         allocation = np.empty((size, periods, rows_of(self._model), thrusters))
-        angles = np.empty((size, periods + 1, copy.attitude_error.shape[1]))
+        body = len(self._world.attitude) + len(self._world.watched)
+        angles = np.empty((size, periods + 1, body))
+        # Joints that a policy moves go on as they were last commanded.
+        steered = copy.world.actions > thrusters
+        rates = copy.read("joint_commands") if steered else np.empty((size, 0))
+        rates = (rates / copy.shared.joint_rate_limit).astype(np.float32)
         for i in range(periods):
             self._world.allocate(copy.observation, allocation[:, i])
-            angles[:, i] = copy.attitude_error
+            angles[:, i] = copy.attitude_error[:, -body:]
             forces = allocation[:, i, : self._model.axes] * copy.read("force")[:, np.newaxis]
             thrust[:, i] = forces.sum(axis=2)
-            copy.step(_action(plan[:, i], copy.limit))
-            error[:, i] = copy.error
-        angles[:, periods] = copy.attitude_error
+            copy.step(np.hstack([_action(plan[:, i], copy.limit), rates]))
+            error[:, i] = copy.mass_error
+        angles[:, periods] = copy.attitude_error[:, -body:]
         return Foreseen(error, thrust, self._wanted(angles), allocation)
 
     def _wanted(self, angles: Array) -> Array:
         """Wanted moments from the attitude errors, (batch, periods + 1, angles); see `signals`."""
         model, now = self._model, angles[:, :-1].copy()
         rate = np.diff(angles, axis=1) / model.h
-        if model.attitude_rate >= 0:
-            now += ATTITUDE_LEAD * rate
+        now += (ATTITUDE_LEAD if model.attitude_rate >= 0 else self.gains.heading_lead) * rate
         wanted = -self.gains.heading_gain * now
         if model.watched:
             damping = -ROLL_DAMPING * rate[:, :, model.angles]

@@ -18,7 +18,7 @@ class Zero:
 
     def __init__(self, nominal: Nominal) -> None:
         """Take the number of thrusters."""
-        self._thrusters = world_of(nominal.robot).thrusters
+        self._thrusters = world_of(nominal.robot).actions
 
     def predict(
         self,

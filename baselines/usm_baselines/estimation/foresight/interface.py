@@ -3,7 +3,8 @@
 Link angles and rates, joint references and thruster commands are known on board; position and
 velocity of the centre of mass and what the nominal model leaves out, an acceleration d, are
 estimated. The future of the joint references is that of a critically damped filter of an assumed
-frequency, from their present value, rate and acceleration. All water is at rest or has the current
+frequency, from their present value, rate and acceleration; where a policy steers the joints, they
+go on as they were last commanded. All water is at rest or has the current
 that is believed in, and is accelerated by d.
 """
 
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 
 from usm_baselines.signals import Array
 from usm_gym.kernels.compile import piece, shared
-from usm_gym.kernels.lanes import WIDTH
+from usm_gym.kernels.lanes import WIDTH, padded
+from usm_gym.plant.steering import ANGLE, QUANTITIES, steering_of, steering_row
 from usm_gym.plant.thrusters import delivered
 from usm_gym.sensors import value
 from usm_gym.support.validation import require
@@ -87,6 +89,32 @@ def place_thrusters(applied, nominal, entries, rows, thrusters, gains, forces, b
         target = delivered(command, gains[j], nominal.row[rows.dead_band])
         block[(rows.target + j) * WIDTH + lane] = target
         block[(rows.force + j) * WIDTH + lane] = forces[j]
+
+
+def steering_rows(plant: Any, row: Array, nominal: Nominal) -> tuple[Any, Array]:
+    """Plant and rows of a robot, to which those of its steering are added if it is steered."""
+    if nominal.joint_time_constant == 0.0:
+        return plant, row
+    steering = steering_of(row.size, plant.h, nominal.joint_time_constant)
+    more = np.zeros(QUANTITIES * padded(plant.links))
+    return plant._replace(**steering._asdict()), np.concatenate([row, more])
+
+
+@piece
+def place_steering(seen, nominal, entry, block, lane):
+    """Set references and commanded rates of the joints of a robot that is steered.
+
+    `entry` is the number of the entry of the references, which those of their rates and of their
+    accelerations follow.
+    """
+    plant, links = nominal.plant, nominal.plant.links
+    for j in range(links - 1):
+        rate = value(seen, nominal, entry + 1, j)
+        away = plant.joint_time_constant * value(seen, nominal, entry + 2, j)
+        first = steering_row(plant.steering, ANGLE, links) + j
+        block[first * WIDTH + lane] = value(seen, nominal, entry, j)
+        block[(first + padded(links)) * WIDTH + lane] = rate
+        block[(first + 2 * padded(links)) * WIDTH + lane] = rate + away
 
 
 class Foresight(ABC):

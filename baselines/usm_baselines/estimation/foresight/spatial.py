@@ -21,7 +21,9 @@ from usm_baselines.estimation.foresight.interface import (
     estimates_of,
     foresight_of,
     gains_from,
+    place_steering,
     place_thrusters,
+    steering_rows,
 )
 from usm_baselines.signals import Array
 from usm_gym.kernels.compile import compiled, piece
@@ -54,6 +56,7 @@ def nominal_plant(nominal: Nominal) -> NominalPlant:
         dead_band=nominal.thruster_dead_band,
     )
     row[SHIFT_STEP] = -1.0
+    plant, row = steering_rows(plant, row, nominal)
     layout = world_of(robot).layout
     return NominalPlant(plant, row, REFERENCE_FREQUENCY, layout.starts, layout.scale, period)
 
@@ -169,7 +172,10 @@ def place(seen, nominal, state, applied, belief, middle, moving, block, lane):
         block[(V + axis) * WIDTH + lane] = velocity - moving[axis]
         block[(WATER_A + axis) * WIDTH + lane] = d
         block[(WATER + axis) * WIDTH + lane] = belief[CURRENT + axis]
-    place_references(seen, nominal, block, lane)
+    if nominal.plant.steering > 0:
+        place_steering(seen, nominal, ENTRY.joint_references, block, lane)
+    else:
+        place_references(seen, nominal, block, lane)
     rows = thruster_rows(links, thrusters)
     entries = ENTRY.thruster_command, ENTRY.thruster_limit
     gains, pushing = belief[gains_from(AXES) :], state[estimates_of(AXES) :]
