@@ -180,7 +180,11 @@ def test_the_page_sees_what_the_films_see(browser, path, simulation):
     picture = depiction_of(SCENARIO.body).recorder().picture(simulation)
     posture = stage_of(SCENARIO.body).postures([picture])[0]
     mass = centre_of_mass(SCENARIO.body, *picture.body)
-    script = "return linkPoses(replays[0].data.robot, ...arguments).map(({ centre }) => centre)"
+    script = (
+        "const { data } = replays[0];"
+        "const { poses } = linkPoses(data.robot, ...arguments, data.follower);"
+        "return poses.map(({ centre }) => centre)"
+    )
     centres = browser.execute_script(script, posture.tolist(), mass.tolist())
     np.testing.assert_allclose(centres, picture.body.centres, atol=1e-3)  # lengths are rounded
     # The same camera as that of the films, on as many points as the page has pixels.
@@ -202,7 +206,8 @@ def test_the_head_is_where_the_camera_sees_it(browser, path):
     script = (
         "const view = replays[0].view, data = view.data.robot;"
         "const { position } = view.replay.placeAt(view.replay.a, 1.5);"
-        "const poses = linkPoses(data, rowAt(view.replay.a.posture, 15, true), position);"
+        "const posture = rowAt(view.replay.a.posture, 15, true);"
+        "const { poses } = linkPoses(data, posture, position, view.data.follower);"
         "return view.camera.see(poses[8].centre)"
     )
     expected = browser.execute_script(script)[:2]

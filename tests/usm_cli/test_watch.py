@@ -21,6 +21,7 @@ from usm_cli import film
 from usm_cli.program import main
 from usm_cli.take import instants, take
 from usm_gym.rendering.window import _windows
+from usm_gym.task.head_sampling import nominal_head
 from usm_gym.task.spatial_sampling import nominal_in_space
 from usm_gym.task.spatial_scenario import SpatialPath
 
@@ -29,6 +30,10 @@ SHORT = dataclasses.replace(usm_gym.suite("operation")[1], duration=2.0, settle_
 
 IN_SPACE = dataclasses.replace(
     nominal_in_space("operation3d"), duration=1.0, settle_time=0.5, path=SpatialPath(speed=0.2)
+)
+OF_HEAD, OF_HEAD_IN_SPACE = (
+    dataclasses.replace(nominal_head(mode), duration=1.0, settle_time=0.5)
+    for mode in ("head", "head3d")
 )
 
 
@@ -102,12 +107,18 @@ def test_two_policies_meet_the_same_scenario_and_noise():
 
 
 @pytest.mark.parametrize(
-    ("names", "suffix", "width", "size"),
-    [(["pd"], ".mp4", 320, (320, 240)), (["pd", "sta"], ".gif", 240, (240, 268))],
+    ("scenario", "names", "suffix", "width", "size"),
+    [
+        (IN_SPACE, ["pd"], ".mp4", 320, (320, 240)),
+        (IN_SPACE, ["pd", "sta"], ".gif", 240, (240, 268)),
+        (OF_HEAD, ["rates-pd"], ".mp4", 320, (320, 240)),
+        (OF_HEAD, ["rates-pd", "rates-lqg-joints"], ".gif", 240, (240, 268)),
+        (OF_HEAD_IN_SPACE, ["rates-pd", "rates-lqg-joints"], ".gif", 240, (240, 268)),
+    ],
 )
-def test_a_robot_in_space_is_filmed_as_one_in_the_plane(names, suffix, width, size, output):
-    shown = instants(IN_SPACE, 12.5, 2.0)
-    takes = [take(contender(name), IN_SPACE, shown) for name in names]
+def test_other_robots_are_filmed_as_the_papers(scenario, names, suffix, width, size, output):
+    shown = instants(scenario, 12.5, 2.0)
+    takes = [take(contender(name), scenario, shown) for name in names]
     made = film.Film(takes, names, len(shown), width, speed=2.0)
     path = output.with_suffix(suffix)
     film.write(made, path, 12.5)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from usm_gym.manipulator import Manipulator
 from usm_gym.robots import AnyRobot
 
 
@@ -178,4 +179,4 @@ class Chapter:
     policies: Sequence[str] = ()
     verdict: str = ""
     motion: str = ""
-    robots: Mapping[str, AnyRobot] = field(default_factory=dict)
+    robots: Mapping[str, AnyRobot | Manipulator] = field(default_factory=dict)

@@ -35,6 +35,7 @@ from usm_cli.report.tables import (
     verdict_table,
 )
 from usm_cli.report.words import CONDITIONS, PAPERS, SCORES, in_words, motion, verdict
+from usm_gym.manipulator import Manipulator
 from usm_gym.robots import AnyRobot
 from usm_gym.suites import unseen
 from usm_gym.support.files import read_json
@@ -294,10 +295,11 @@ def conditions(label: str, name: str, scenarios: Scenarios, besides: str = "") -
     return [Tables("Conditions", CONDITIONS + besides, label, table)]
 
 
-def robots(lists: Mapping[str, Scenarios]) -> dict[str, AnyRobot]:
+def robots(lists: Mapping[str, Scenarios]) -> dict[str, AnyRobot | Manipulator]:
     """The robot of every list of scenarios, which share it, if it is one of this package."""
     first = {name: scenarios[0] for name, scenarios in lists.items()}
-    return {name: it.body for name, it in first.items() if not isinstance(it, OtherScenario)}
+    known = {name: it for name, it in first.items() if not isinstance(it, OtherScenario)}
+    return {name: scenario.body for name, scenario in known.items()}
 
 
 def front(rows: Mapping[str, Scores], axes: Sequence[str]) -> list[Plot]:

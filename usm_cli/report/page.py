@@ -12,6 +12,7 @@ import jinja2
 from usm_cli.report.blocks import Chapter, Replay
 from usm_cli.report.stage import stage_of
 from usm_cli.report.words import glossary
+from usm_gym.manipulator import Manipulator, bare
 from usm_gym.robots import AnyRobot, name_of
 
 ASSETS = files(__package__)
@@ -67,23 +68,24 @@ def html(chapters: Sequence[Chapter], made: Mapping[str, Any]) -> str:
 
 
 def drawings(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
-    """Of every robot the view, the drawing, what it shows, and which robot it is.
+    """Of every robot the view, what follows a path, the drawing, what it shows, and its name.
 
     Where there are several, the last says also in what each of them swims.
     """
-    places: dict[AnyRobot, list[str]] = {}
+    places: dict[AnyRobot | Manipulator, list[str]] = {}
     for chapter in chapters:
         for place, robot in chapter.robots.items():
             places.setdefault(robot, []).append(place)
     drawn = []
     for robot, found in places.items():
-        stage, name = stage_of(robot), name_of(robot)
+        stage, name = stage_of(robot), name_of(bare(robot))
         svg, words = stage.drawing()
         caption = name if isinstance(name, str) else "a robot of its own"
         if len(places) > 1:
             caption += f": {'; '.join(dict.fromkeys(found))}"
         data = base64.b64encode(svg.encode()).decode()
-        drawn.append({"view": stage.view, "data": data, "words": words, "caption": caption})
+        task = {"view": stage.view, "follower": stage.follower}
+        drawn.append({**task, "data": data, "words": words, "caption": caption})
     return drawn
 
 

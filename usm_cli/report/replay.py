@@ -39,13 +39,13 @@ class Acted:
 
     Attributes:
         data: The data that the page plays.
-        reference: Reference postures, (pictures, numbers).
+        reference: Reference postures, (pictures, numbers); None where no posture is asked for.
         current: Velocity of the water, m/s, (pictures, axes).
         max_error: Largest error after settling in each axis, m.
     """
 
     data: dict[str, Any]
-    reference: Array
+    reference: Array | None
     current: Array
     max_error: tuple[float, ...]
 
@@ -105,14 +105,15 @@ def replayed(
             acted[contender.name] = outcome
     if not acted:
         return Episodes({"episodes": {}}, {}, missing)
-    longest = max(acted.values(), key=lambda episode: len(episode.reference))
+    longest = max(acted.values(), key=lambda episode: len(episode.current))
+    reference = longest.reference
     period = scenario.conditions.control_period
     shown = instants(scenario, FPS, 1.0)
     data = frame(scenario, scenario.reference_positions()[shown]) | {
         "start": period,
         "period": period,
         "current": packed(longest.current),
-        "reference": packed(longest.reference),
+        "reference": None if reference is None else packed(reference),
         "episodes": {name: episode.data for name, episode in acted.items()},
     }
     errors = {name: episode.max_error for name, episode in acted.items()}
@@ -170,6 +171,7 @@ def frame(scenario: AnyScenario, path: Array) -> dict[str, Any]:
     stage = stage_of(scenario.body)
     return {
         "view": stage.view,
+        "follower": stage.follower,
         "axes": list(world_of(scenario.body).axes),
         "duration": scenario.duration,
         "settle": scenario.settle_time,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import singledispatch
 from typing import Any, ClassVar
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from usm_gym.manipulator import Manipulator
 from usm_gym.rendering.figure import robot_drawing
 from usm_gym.rendering.look import BODY, BODY_EDGE, HEAD, HEAD_EDGE, TAIL, Colour
-from usm_gym.rendering.picture import Picture
+from usm_gym.rendering.picture import Follower, Picture
 from usm_gym.rendering.space.body import JET_LENGTH, jet_place, solids
 from usm_gym.rendering.space.figure import spatial_robot_drawing
 from usm_gym.rendering.space.mesh import Solid
@@ -38,9 +39,11 @@ class Stage(ABC):
 
     Attributes:
         view: The name that the page has for the way in which it draws them.
+        follower: What has to follow the path.
     """
 
     view: ClassVar[str]
+    follower: Follower
 
     @abstractmethod
     def robot(self) -> dict[str, Any]:
@@ -55,8 +58,8 @@ class Stage(ABC):
         """True postures, (pictures, numbers)."""
 
     @abstractmethod
-    def references(self, pictures: Sequence[Any]) -> Array:
-        """Reference postures, (pictures, numbers)."""
+    def references(self, pictures: Sequence[Any]) -> Array | None:
+        """Reference postures, (pictures, numbers); None where no posture is asked for."""
 
 
 @singledispatch
@@ -70,9 +73,9 @@ class PlanarStage(Stage):
 
     view = "plane"
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, follower: Follower = "centre of mass") -> None:
         """Draw a robot."""
-        self._robot = robot
+        self._robot, self.follower = robot, follower
 
     def robot(self) -> dict[str, Any]:
         """Length and half width of a link, m, and the thrusters."""
@@ -87,20 +90,22 @@ class PlanarStage(Stage):
         }
 
     def drawing(self) -> tuple[str, str]:
-        """The robot from above on its path."""
-        return robot_drawing(self._robot), (
+        """The robot from above, on its path if that is its centre of mass's."""
+        on_path = self.follower == "centre of mass"
+        error = ", the error from the path to the centre of mass," if on_path else ""
+        return robot_drawing(self._robot, on_path), (
             f"The robot from above: links 1 to {self._robot.links} from tail to head, positive "
-            "thruster forces, the error from the path to the centre of mass, and the signs of all "
-            "angles"
+            f"thruster forces{error} and the signs of all angles"
         )
 
     def postures(self, pictures: Sequence[Picture]) -> Array:
         """Link angles, rad, (pictures, links)."""
         return np.array([picture.body.angles for picture in pictures])
 
-    def references(self, pictures: Sequence[Picture]) -> Array:
-        """Link angles asked for, rad, (pictures, links)."""
-        return np.array([picture.reference.angles for picture in pictures])
+    def references(self, pictures: Sequence[Picture]) -> Array | None:
+        """Link angles asked for, rad, (pictures, links), if any are."""
+        asked = [picture.reference.angles for picture in pictures if picture.reference]
+        return np.array(asked) if asked else None
 
 
 class SpatialStage(Stage):
@@ -108,9 +113,9 @@ class SpatialStage(Stage):
 
     view = "space"
 
-    def __init__(self, robot: SpatialRobot) -> None:
+    def __init__(self, robot: SpatialRobot, follower: Follower = "centre of mass") -> None:
         """Draw a robot."""
-        self._robot = robot
+        self._robot, self.follower = robot, follower
 
     def robot(self) -> dict[str, Any]:
         """Links, joints, solids and jets; lengths in m, masses in kg."""
@@ -147,9 +152,10 @@ class SpatialStage(Stage):
         """Quaternions (w, x, y, z) and joint angles, (pictures, 4 + joints)."""
         return self._numbers([picture.body for picture in pictures])
 
-    def references(self, pictures: Sequence[SpatialPicture]) -> Array:
-        """The same of the reference, (pictures, 4 + joints)."""
-        return self._numbers([picture.wanted for picture in pictures])
+    def references(self, pictures: Sequence[SpatialPicture]) -> Array | None:
+        """The same of the reference, (pictures, 4 + joints), if there is one."""
+        asked = [picture.wanted for picture in pictures if picture.wanted]
+        return self._numbers(asked) if asked else None
 
     def _numbers(self, poses: Sequence[Pose]) -> Array:
         rotations = np.array([pose.rotations for pose in poses])
@@ -173,6 +179,13 @@ def _(robot: Robot) -> Stage:
 @stage_of.register
 def _(robot: SpatialRobot) -> Stage:
     return SpatialStage(robot)
+
+
+@stage_of.register
+def _(robot: Manipulator) -> Stage:
+    kinds: dict[type, Callable[[Any, Follower], Stage]]
+    kinds = {Robot: PlanarStage, SpatialRobot: SpatialStage}
+    return kinds[type(robot.robot)](robot.robot, "head")
 
 
 def _solid(solid: Solid) -> dict[str, Any]:

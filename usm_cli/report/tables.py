@@ -26,6 +26,7 @@ from usm_cli.report.blocks import Cell, Column, Mark, Rivals, SortableTable
 from usm_cli.score_table import combined_error
 from usm_gym.statistics import FEWEST_EPISODES, told_apart
 from usm_gym.support.text import degrees, figures, mm
+from usm_gym.task.head_scenario import HeadEpisode
 from usm_gym.task.modes import AnyScenario
 
 Row = TypeVar("Row", bound=Scores)
@@ -186,6 +187,8 @@ def conditions_table(suites: Mapping[str, Sequence[AnyScenario]]) -> SortableTab
         modes = ", ".join(sorted({scenario.mode for scenario in scenarios}))
         low, high = conditions.coefficient_range
         moving = any(scenario.shifts for scenario in scenarios)
+        steered = isinstance(scenarios[0], HeadEpisode)
+        motion = "the policy's" if steered else "yes" if moving else "none"
         current = 100 * (conditions.current_limit + conditions.current_variation)
         cells = [Cell(name, name), Cell(str(len(scenarios)), len(scenarios)), Cell(modes, modes)]
         for value in (
@@ -197,7 +200,7 @@ def conditions_table(suites: Mapping[str, Sequence[AnyScenario]]) -> SortableTab
         ):
             cells.append(Cell(f"{value:g}", value))
         cells.append(Cell(f"{low:g} to {high:g}", high - low))
-        cells.append(Cell("yes" if moving else "none", float(moving)))
+        cells.append(Cell(motion, float(moving or steered)))
         body.append(cells)
     return SortableTable([Column(title) for title in CONDITIONS], body)
 

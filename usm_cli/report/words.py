@@ -12,8 +12,10 @@ from usm_baselines.registry import base_of, entry, ids
 from usm_cli.report.tables import competes
 from usm_cli.score_table import combined_error, conclusion
 from usm_gym.support.text import counted, figures, listed
+from usm_gym.task.head_scenario import HeadEpisode
 from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 from usm_gym.task.modes import AnyScenario
+from usm_gym.task.scenario import Scenario
 from usm_gym.task.spatial_scenario import SpatialScenario
 
 # The paper's controller, with which the best one is compared.
@@ -79,10 +81,14 @@ def verdict(rows: Mapping[str, Scores]) -> str:
 
 def in_words(scenario: AnyScenario) -> str:
     """Describe a scenario in a sentence or two."""
-    path, water, conditions = scenario.path, scenario.water, scenario.conditions
-    parts = [f"{scenario.mode} mode, {scenario.duration:g} s, at {100 * path.speed:.1f} cm/s"]
-    if scenario.shifts:
-        parts.append(bends(scenario))
+    water, conditions = scenario.water, scenario.conditions
+    parts = [f"{scenario.mode} mode, {scenario.duration:g} s"]
+    if isinstance(scenario, HeadEpisode):
+        parts.append(figure(scenario))
+    else:
+        parts[0] += f", at {100 * scenario.path.speed:.1f} cm/s"
+        if scenario.shifts:
+            parts.append(bends(scenario))
     current = sum(speed**2 for speed in water.current) ** 0.5
     parts.append(f"current {100 * current:.1f} cm/s")
     low, high = min(water.coefficients), max(water.coefficients)
@@ -92,7 +98,14 @@ def in_words(scenario: AnyScenario) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def bends(scenario: AnyScenario) -> str:
+def figure(scenario: HeadEpisode) -> str:
+    """Say what the head traces."""
+    positions = scenario.reference_positions()[-scenario.steps // 2 :]
+    sizes = [f"{100 * size:.0f}" for size in positions.max(axis=0) - positions.min(axis=0)]
+    return f"the head traces a figure of {' × '.join(sizes)} cm"
+
+
+def bends(scenario: Scenario | SpatialScenario) -> str:
     """Say how the joints move, and when."""
     if isinstance(scenario, SpatialScenario):
         scan = scenario.scan

@@ -48,12 +48,17 @@ ARROW, ARROW_AREA = np.array([615.0, 40.0]), pygame.Rect(602, 28, 26, 24)
 class Canvas:
     """Draws pictures of one size."""
 
-    def __init__(self, width: int = WIDTH) -> None:
-        """Prepare to draw frames `width` pixels wide and three quarters of that high."""
-        self._unit = width / WIDTH
+    def __init__(self, width: int = WIDTH, metre: float = METRE) -> None:
+        """Prepare to draw frames `width` pixels wide and three quarters of that high.
+
+        Args:
+            width: Pixels.
+            metre: Points in a metre of the scene.
+        """
+        self._unit, self._metre = width / WIDTH, metre
         self.size = (width, round(HEIGHT * self._unit))
         self._frame = pygame.Surface(self.size)
-        self._scene = Scene(SCENE, self._unit, METRE, np.array(SCENE.center))
+        self._scene = Scene(SCENE, self._unit, metre, np.array(SCENE.center))
         self._lens = Lens(np.array(LENS), LENS_RADIUS, self._unit)
         self._chart = Chart(CHART, CAPTIONS, self._unit, "xy", ERROR_COLOURS)
         self._arrow = Panel(ARROW_AREA, self._unit)
@@ -73,24 +78,24 @@ class Canvas:
         scale = scale or error_scale(picture.errors)
         if self._episode != (picture.scenario, scale):
             self._episode = (picture.scenario, scale)
-            self._draw_still_parts(picture.scenario, scale)
+            self._draw_still_parts(picture, scale)
         self._frame.blit(self._still, (0, 0))
         self._headline(picture, title)
         self._swimming(picture)
-        self._lens.draw(self._frame, latest(picture), scale)
+        self._lens.draw(self._frame, picture.follower, latest(picture), scale)
         self._chart.draw(self._frame, picture.times, picture.errors)
         pixels = np.empty((self.size[1], self.size[0], 3), np.uint8)
         pygame.image.frombuffer(pixels.data, self.size, "RGB").blit(self._frame, (0, 0))
         return pixels
 
-    def _draw_still_parts(self, scenario: Scenario, scale: float) -> None:
+    def _draw_still_parts(self, picture: Picture, scale: float) -> None:
         """Draw what all frames of an episode share."""
+        scenario = picture.scenario
         self._frame.fill(PAPER)
-        self._legend(scenario)
+        self._legend(picture)
         self._lens_words(scale)
-        self._chart.prepare(
-            self._frame, scenario.duration, scenario.settle_time, scenario.shifts, scale
-        )
+        shared = (scenario.duration, scenario.settle_time, scenario.shifts)
+        self._chart.prepare(self._frame, picture.follower, *shared, scale)
         self._still = self._frame.copy()
 
     def _headline(self, picture: Picture, title: str) -> None:
@@ -123,29 +128,29 @@ class Canvas:
         """Draw the robot and its path."""
         bar = np.array([SCENE.right - 14.0, SCENE.bottom - 8.0])
         self._scene.draw(self._frame, picture, bar=bar)
-        middle = bar[0] - GRID * METRE / 2
+        middle = bar[0] - GRID * self._metre / 2
         self._text(f"{GRID:g} m", (middle, bar[1] - 15), 10, GREY, MIDDLE)
 
     def _lens_words(self, scale: float) -> None:
-        magnification = float(f"{self._lens.reach / scale / METRE:.2g}")
+        magnification = float(f"{self._lens.reach / scale / self._metre:.2g}")
         self._text(f"error, {magnification:g} times as large", (14, CAPTIONS), 10, GREY)
         self._text(in_mm(scale), (LENS[0] + LENS_RADIUS + 4, LENS[1] - 7), 10, GREY)
 
-    def _legend(self, scenario: Scenario) -> None:
+    def _legend(self, picture: Picture) -> None:
         """Draw the symbols, with their names to the right of them."""
-        limit = scenario.conditions.thruster_limit
-        jet = 0.5 * JET_LENGTH * METRE
+        limit = picture.scenario.conditions.thruster_limit
+        jet = 0.5 * JET_LENGTH * self._metre
         thrust = partial(legend.thrust, length=jet)
         signs: list[legend.Sign] = [
             ("head", 16, legend.head),
             ("centre of mass", 14, legend.mass),
-            ("its goal", 18, legend.goal),
+            (legend.GOALS[picture.follower], 18, legend.goal),
             ("path", 20, legend.path),
             ("track", 18, legend.track),
-            ("reference", 20, legend.reference),
-            (f"thrust of {limit / 2:g} N", round(jet), thrust),
         ]
-        signs += [("joints bend", 6, legend.shift)] if scenario.shifts else []
+        signs += [("reference", 20, legend.reference)] if picture.reference else []
+        signs.append((f"thrust of {limit / 2:g} N", round(jet), thrust))
+        signs += [("joints bend", 6, legend.shift)] if picture.scenario.shifts else []
         legend.legend(self._frame, self._unit, (14.0, LEGEND), signs)
 
     def _text(

@@ -9,6 +9,7 @@ import pygame
 
 from usm_gym.rendering.look import GREY, HEAD, RULE, WATER, Colour, Points
 from usm_gym.rendering.panel import MIDDLE, RIGHT, Panel, write
+from usm_gym.rendering.picture import Follower
 from usm_gym.rendering.scene import thinned
 
 SCALES = tuple(digit * 10.0**power for power in (-4, -3, -2, -1, 0) for digit in (1, 2, 5))
@@ -21,7 +22,7 @@ def error_scale(errors: Points) -> float:
 
 
 class Chart:
-    """The error of the centre of mass along some axes, over an episode."""
+    """The error of what follows the path along some axes, over an episode."""
 
     def __init__(
         self, area: pygame.Rect, caption: float, unit: float, axes: str, colours: Sequence[Colour]
@@ -41,6 +42,7 @@ class Chart:
     def prepare(
         self,
         frame: pygame.Surface,
+        follower: Follower,
         duration: float,
         settle_time: float,
         shifts: Sequence[float],
@@ -50,13 +52,14 @@ class Chart:
 
         Args:
             frame: The frame.
+            follower: What follows the path.
             duration: Duration of the episode, s.
             settle_time: When its scored part begins, s.
             shifts: When the joints start to move, s.
             scale: The largest error shown, m.
         """
         area, self._duration, self._scale = self._area, duration, scale
-        self._words(frame)
+        self._words(frame, follower)
         panel = self._panel = Panel(area.inflate(8, 8), self._unit)
         width = area.width / duration
         settling = pygame.Rect(area.topleft, (round(settle_time * width), area.height))
@@ -80,9 +83,9 @@ class Chart:
             self._panel.disc(curve[-1], 2.2, colour)
         self._panel.show(frame)
 
-    def _words(self, frame: pygame.Surface) -> None:
+    def _words(self, frame: pygame.Surface, follower: Follower) -> None:
         area, unit = self._area, self._unit
-        caption = "error of the centre of mass:"
+        caption = f"error of the {follower}:"
         x = write(frame, unit, caption, (area.left, self._caption), 10, GREY)
         for letter, colour in zip(self._axes, self._colours, strict=True):
             x = write(frame, unit, letter, (x + 8, self._caption), 10, colour)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pygame
@@ -29,8 +30,8 @@ from usm_gym.rendering.look import (
     Points,
 )
 from usm_gym.rendering.panel import LEFT, MIDDLE, RIGHT, Panel, write
-from usm_gym.rendering.picture import AnyPicture
-from usm_gym.rendering.scene import OUTLINE, arrow, cross_hair, draw_jet, thinned
+from usm_gym.rendering.picture import AnyPicture, Follower
+from usm_gym.rendering.scene import OUTLINE, arrow, cross_hair, draw_follower, draw_jet, thinned
 from usm_gym.task.conditions import Conditions
 from usm_gym.world import Episode
 
@@ -44,6 +45,36 @@ COLOURS = (*ERROR_COLOURS, TRAIL)
 # The outer ring of a lens holds this share of each policy's errors; the rare others are at its rim.
 USUAL = 0.95
 SMALL, NORMAL, LARGE = 13, 17, 25
+Sign = Literal["centre of mass", "head", "goal", "outline", "jet", "current"]
+# By what follows the path: what makes it difficult, and the signs with their names.
+MEANWHILE: dict[Follower, str] = {
+    "centre of mass": "while the body bends",
+    "head": "with thrusters and joints",
+}
+LEGENDS: dict[Follower, dict[Sign, str]] = {
+    "centre of mass": {
+        "centre of mass": "centre of mass",
+        "goal": "goal",
+        "outline": "planned shape",
+        "jet": "thrust",
+        "current": "current",
+    },
+    "head": {
+        "head": "head",
+        "goal": "goal",
+        "centre of mass": "centre of mass",
+        "jet": "thrust",
+        "current": "current",
+    },
+}
+WIDTHS: dict[Sign, int] = {
+    "centre of mass": 15,
+    "head": 15,
+    "goal": 18,
+    "outline": 18,
+    "jet": 20,
+    "current": 18,
+}
 
 
 @dataclass(frozen=True)
@@ -96,7 +127,7 @@ class Comparison:
         areas = [pygame.Rect(MARGIN, top, WIDTH - 2 * MARGIN, WATERS) for top in tops]
         self._rows = depiction_of(scenario.body).rows(areas, self._unit, ring)
         self._frame.fill(PAPER)
-        self._heading(scenario.conditions, speed)
+        self._heading(last[0].follower, scenario.conditions, speed)
         for row, caption in enumerate(captions):
             self._caption(caption, tops[row] - STRIP, COLOURS[row])
         self._empty_chart(scenario)
@@ -115,42 +146,36 @@ class Comparison:
         pygame.image.frombuffer(pixels.data, self.size, "RGB").blit(self._frame, (0, 0))
         return pixels
 
-    def _heading(self, conditions: Conditions, speed: float) -> None:
+    def _heading(self, follower: Follower, conditions: Conditions, speed: float) -> None:
         """Say what the goal is, and what the signs mean."""
         x = self._text("Hold", (MARGIN, 9), NORMAL, INK)
-        x = self._sign("mass", x + 7, 20)
+        x = self._sign(follower, x + 7, 20)
         x = self._text("on", (x + 6, 9), NORMAL, INK)
         x = self._sign("goal", x + 7, 20)
-        self._text("while the body bends", (x + 6, 9), NORMAL, INK)
+        self._text(MEANWHILE[follower], (x + 6, 9), NORMAL, INK)
         x = MARGIN
-        for kind, words in (
-            ("mass", "centre of mass"),
-            ("goal", "goal"),
-            ("outline", "planned shape"),
-            ("jet", "thrust"),
-            ("current", "current"),
-        ):
+        for kind, words in LEGENDS[follower].items():
             x = self._sign(kind, x, 43)
             x = self._text(words, (x + 4, 35), SMALL, GREY) + 8
         words = f"{measured(conditions)}; {speed:g} times real time"
         self._text(words, (MARGIN, 53), SMALL, GREY)
 
-    def _sign(self, kind: str, x: float, y: float) -> float:
+    def _sign(self, kind: Sign, x: float, y: float) -> float:
         """Draw a sign from x on, around the height y, and return where it ends."""
-        wide = {"mass": 15, "goal": 18, "outline": 18, "jet": 20, "current": 18}[kind]
+        wide = WIDTHS[kind]
         x = round(x)
         sign = Panel(pygame.Rect(x, round(y) - 10, wide, 20), self._unit)
         middle, end = np.array([x + wide / 2, y]), np.array([x + wide - 1.0, y])
-        if kind == "mass":
-            sign.centre_of_mass(middle)
-        elif kind == "goal":
+        if kind == "goal":
             cross_hair(sign, middle, 0.6)
         elif kind == "outline":
             sign.outline(middle + LINK * (0.42 * wide, 5.5), 1.5, OUTLINE)
         elif kind == "jet":
             draw_jet(sign, np.array([x + 1.0, y]), np.array([wide - 2.0, 0.0]))
-        else:
+        elif kind == "current":
             arrow(sign, np.array([x + 1.0, y]), end, 1.6, CURRENT)
+        else:
+            draw_follower(sign, kind, middle, INK)
         sign.show(self._frame)
         return float(x + wide)
 
@@ -162,7 +187,7 @@ class Comparison:
             self._text(f"told: {caption.told}", (MARGIN + 12, top + 23), SMALL, GREY)
 
     def _readout(self, picture: AnyPicture, top: int, colour: Colour) -> None:
-        """Write how far the centre of mass is, or was at most, from its goal."""
+        """Write how far what follows the path is, or was at most, from its goal."""
         if picture.lost:
             self._text("lost", (WIDTH - MARGIN, top), LARGE, ALARM, RIGHT)
             return
@@ -210,7 +235,7 @@ class Comparison:
 
 
 def distances(picture: AnyPicture) -> Points:
-    """Distances of the centre of mass from its goal so far, m, (k,)."""
+    """Distances of what follows the path from its goal so far, m, (k,)."""
     return np.asarray(np.linalg.norm(picture.errors, axis=1))
 
 

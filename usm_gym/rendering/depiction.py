@@ -9,15 +9,19 @@ from abc import ABC, abstractmethod
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any, Protocol
 
+from usm_gym.manipulator import Manipulator
 from usm_gym.rendering.look import WIDTH, Colour, Frame
-from usm_gym.rendering.picture import Recorder
-from usm_gym.rendering.space.recorder import SpatialRecorder
+from usm_gym.rendering.picture import HeadRecorder, Recorder
+from usm_gym.rendering.space.recorder import SpatialHeadRecorder, SpatialRecorder
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.spatial_robot import SpatialRobot
 
 if TYPE_CHECKING:
     import pygame
+
+# Points in a metre where a robot that is bent all the time has room, alone and in a row.
+BENT_METRE, BENT_METRE_OF_ROW = 195.0, 92.0
 
 
 class AnyRecorder(Protocol):
@@ -120,6 +124,32 @@ class _Spatial(Depiction):
         from usm_gym.rendering.space.row import SpatialRow
 
         return [SpatialRow(area, unit, ring) for area in areas]
+
+
+class _PlanarHead(_Planar):
+    def recorder(self, index: int = 0) -> AnyRecorder:
+        return HeadRecorder(index)
+
+    def canvas(self, width: int = WIDTH) -> AnyCanvas:
+        from usm_gym.rendering.canvas import Canvas
+
+        return Canvas(width, BENT_METRE)
+
+    def rows(self, areas: list[pygame.Rect], unit: float, ring: float) -> list[AnyRow]:
+        from usm_gym.rendering.row import Row
+
+        return [Row(area, unit, ring, k == 0, BENT_METRE_OF_ROW) for k, area in enumerate(areas)]
+
+
+class _SpatialHead(_Spatial):
+    def recorder(self, index: int = 0) -> AnyRecorder:
+        return SpatialHeadRecorder(index)
+
+
+@depiction_of.register
+def _(robot: Manipulator) -> Depiction:
+    kinds: dict[type, type[Depiction]] = {Robot: _PlanarHead, SpatialRobot: _SpatialHead}
+    return kinds[type(robot.robot)]()
 
 
 @depiction_of.register

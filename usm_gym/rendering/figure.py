@@ -62,24 +62,32 @@ class Scene:
         return np.asarray(self.centre + self.scale * metres * (1, -1))
 
 
-def robot_drawing(robot: Robot) -> str:
+def robot_drawing(robot: Robot, on_path: bool = True) -> str:
     """Draw a robot with links, thrusters, path, error and current, and a joint in detail.
+
+    Args:
+        robot: The robot.
+        on_path: Whether path and error of the centre of mass are drawn.
 
     Returns:
         An SVG document, the same whenever it is made.
     """
     scene = _scene(robot)
     title = f"An underwater swimming manipulator of {robot.links} links"
+    error = (
+        "The error leads from the reference on the path to the centre of mass. " if on_path else ""
+    )
     description = (
         f"From above: a chain of links, 1 at the tail to {robot.links} at the head. A positive "
         f"deflection turns the head clockwise. {len(robot.thrusters)} numbered thrusters push "
-        "along or across their links; arrows show positive forces. The error leads from the "
-        "reference on the path to the centre of mass. A detail shows two links: link angles run "
-        "anticlockwise from the x axis, and the joint angle is that of the link nearer to the "
-        "tail less that of the other."
+        f"along or across their links; arrows show positive forces. {error}A detail shows two "
+        "links: link angles run anticlockwise from the x axis, and the joint angle is that of the "
+        "link nearer to the tail less that of the other."
     )
-    marks = [_path(scene), _current(), _axes(), _deflection(scene), _body(scene)]
-    marks += [_thrusters(scene), _error(scene), _detail(robot), _words(robot)]
+    marks = [_path(scene)] if on_path else []
+    marks += [_current(), _axes(), _deflection(scene), _body(scene), _thrusters(scene)]
+    marks += [_error(scene)] if on_path else []
+    marks += [_detail(robot), _words(robot, on_path)]
     return document(SIZE, title, description, marks)
 
 
@@ -232,12 +240,14 @@ def _detail(robot: Robot) -> str:
     return group("detail", *marks)
 
 
-def _words(robot: Robot) -> str:
+def _words(robot: Robot, on_path: bool) -> str:
     """What the symbols mean."""
-    meanings = {
+    error = {
         "*p*": "centre of mass",
         "*p*_{ref}": "its reference, on the path",
         "*e*": "error *p* − *p*_{ref}",
+    }
+    meanings = (error if on_path else {}) | {
         "*f*_j": "positive force of thruster *j*",
         "*t*_i, *n*_i": "along link *i*, to its left",
         "*θ*_i": "link angle, from *x* to *t*_i",

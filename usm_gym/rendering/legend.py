@@ -21,10 +21,13 @@ from usm_gym.rendering.look import (
     faded,
 )
 from usm_gym.rendering.panel import Panel, write
+from usm_gym.rendering.picture import Follower
 from usm_gym.rendering.scene import OUTLINE, cross_hair, draw_jet
 
 # A name, the width of the symbol, points, and what draws it between two places, (2, 2).
 Sign = tuple[str, int, Callable[[Panel, Points], None]]
+# The goal of what follows the path, by that.
+GOALS: dict[Follower, str] = {"centre of mass": "its goal", "head": "the head's goal"}
 
 
 def legend(
@@ -52,7 +55,7 @@ def mass(panel: Panel, ends: Points) -> None:
 
 
 def goal(panel: Panel, ends: Points) -> None:
-    """Draw the goal of a centre of mass."""
+    """Draw the goal of what follows the path."""
     cross_hair(panel, ends.mean(axis=0), 0.6)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.manipulator import bare
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.task.scenario import Scenario
@@ -15,6 +16,8 @@ from usm_gym.task.spatial_water import SpatialWater
 from usm_gym.task.water import Water
 
 Array = NDArray[np.float64]
+# What has to follow the path.
+Follower = Literal["centre of mass", "head"]
 # A lost robot may be anywhere; it is shown at most this far from its reference, m.
 FAR = 10.0
 
@@ -42,6 +45,10 @@ class AnyPicture(Protocol):
     def lost(self) -> bool:
         """Whether the robot is lost."""
 
+    @property
+    def follower(self) -> Follower:
+        """What has to follow the path."""
+
 
 @dataclass(frozen=True)
 class Posture:
@@ -66,33 +73,45 @@ class Picture:
         time: Time since the start, s.
         body: The robot's true posture.
         reference: The posture with the reference joint angles at the reference of the heading, its
-            centre of mass at the reference of the position.
+            centre of mass at the reference of the position; None where no posture is asked for.
         thrust: Forces of the thrusters over their limit, (thrusters,).
         current: Velocity of the water, m/s, (2,).
-        path: Reference of the centre of mass at every control instant of the episode, m, (k, 2).
+        path: Reference of what follows it at every control instant of the episode, m, (k, 2).
+        middle: The point around which the robot is shown: the reference now, or the station, where
+            the centre of mass starts, of a robot that stays there, m, (2,).
+        mass: The true centre of mass, m, (2,).
         instants: The instants recorded so far, in ascending order; the last one is now.
         errors: True position errors at these instants, m, (len(instants), 2).
         max_error: Largest absolute error after settling, m, (2,).
         lost: Whether the robot is lost.
+        follower: What has to follow the path.
     """
 
     robot: Robot
     scenario: Scenario
     time: float
     body: Posture
-    reference: Posture
+    reference: Posture | None
     thrust: Array
     current: Array
     path: Array
+    middle: Array
+    mass: Array
     instants: NDArray[np.int64]
     errors: Array
     max_error: Array
     lost: bool
+    follower: Follower = "centre of mass"
 
     @property
     def times(self) -> Array:
         """The instants recorded so far, s, (len(instants),)."""
         return self.instants * np.float64(self.scenario.conditions.control_period)
+
+    @property
+    def track(self) -> Array:
+        """Where the follower was at these instants, m, (len(instants), 2)."""
+        return self.path[self.instants] + self.errors
 
     @property
     def settle_time(self) -> float:
@@ -133,28 +152,50 @@ class Recorder(Trail):
         """Describe the present."""
         self.note(simulation)
         index, scenario = self.index, simulation.scenarios[self.index]
-        robot = scenario.body
+        robot: Any = bare(scenario.body)
         count = int(simulation.count[index])
         here = self._path[count]
         theta = np.nan_to_num(simulation.read("theta")[index])
         position = np.nan_to_num(simulation.read("position")[index])
         position = np.clip(position, here - FAR, here + FAR)
-        wanted = reference_angles(simulation, index)
         instants = self._recorded(count)
+        errors = np.clip(self._errors[instants], -FAR, FAR)
         return Picture(
             robot=robot,
             scenario=scenario,
             time=count * scenario.conditions.control_period,
             body=Posture(robot.link_centres(theta, position), theta),
-            reference=Posture(robot.link_centres(wanted, here), wanted),
+            reference=self._wanted(simulation),
             thrust=np.nan_to_num(simulation.read("force")[index]) / simulation.limit[index],
             current=velocity(scenario.water, count * scenario.conditions.control_period),
             path=self._path,
+            middle=here,
+            mass=here + errors[-1],
             instants=instants,
-            errors=np.clip(self._errors[instants], -FAR, FAR),
+            errors=errors,
             max_error=simulation.max_error[index].copy(),
             lost=bool(simulation.lost[index]),
         )
+
+    def _wanted(self, simulation: Simulation) -> Posture | None:
+        """The posture that is asked for, if one is."""
+        here = self._path[simulation.count[self.index]]
+        robot = simulation.scenarios[self.index].body
+        angles = reference_angles(simulation, self.index)
+        return Posture(robot.link_centres(angles, here), angles)
+
+
+class HeadRecorder(Recorder):
+    """The same of a robot whose head follows the path, while its body stays at the station."""
+
+    def picture(self, simulation: Simulation) -> Picture:
+        """Describe the present."""
+        shown = super().picture(simulation)
+        mass = shown.body.centres.mean(axis=0)
+        return replace(shown, middle=np.zeros(2), mass=mass, follower="head")
+
+    def _wanted(self, simulation: Simulation) -> None:
+        """None: a policy bends the robot as it likes."""
 
 
 def reference_angles(simulation: Simulation, index: int) -> Array:

@@ -12,14 +12,21 @@ from usm_gym.rendering.scene import GRID, Lens, Scene, latest
 
 METRE = 140.0
 # Places in a row, points from its upper left corner.
-GOAL, LENS, LENS_RADIUS, WORDS = (164.0, 60.0), (399.0, 51.0), 46.0, 101
+MIDDLE_OF_SCENE, LENS, LENS_RADIUS, WORDS = (164.0, 60.0), (399.0, 51.0), 46.0, 101
 SMALL = 13
 
 
 class Row:
     """Draws a robot in the water from above, and its error under a lens."""
 
-    def __init__(self, area: pygame.Rect, unit: float, ring: float, barred: bool) -> None:
+    def __init__(
+        self,
+        area: pygame.Rect,
+        unit: float,
+        ring: float,
+        barred: bool,
+        metre: float = METRE,
+    ) -> None:
         """Prepare to draw.
 
         Args:
@@ -27,12 +34,13 @@ class Row:
             unit: Pixels in a point.
             ring: The error at the outer ring of the lens, m.
             barred: Whether a bar shows a length.
+            metre: Points in a metre of the scene.
         """
-        self._unit, self._ring = unit, ring
-        goal, self._middle = np.add([GOAL, LENS], area.topleft)
-        self._scene = Scene(area, unit, METRE, goal)
+        self._unit, self._ring, self._metre = unit, ring, metre
+        middle, self._middle = np.add([MIDDLE_OF_SCENE, LENS], area.topleft)
+        self._scene = Scene(area, unit, metre, middle)
         self._lens = Lens(self._middle, LENS_RADIUS, unit, WATER)
-        bar = np.add(area.bottomleft, (10 + GRID * METRE, -6.0))
+        bar = np.add(area.bottomleft, (10 + GRID * metre, -6.0))
         self._bar = bar if barred else None
         self._words = area.top + WORDS
 
@@ -42,8 +50,9 @@ class Row:
         if self._bar is not None:
             x, y = self._bar
             write(frame, self._unit, f"{GRID:g} m", (x + 5, y - 12), SMALL, GREY)
-        self._lens.draw(frame, latest(picture), self._ring, colour)
-        magnified(frame, self._unit, (self._middle[0], self._words), self._lens, self._ring, METRE)
+        self._lens.draw(frame, picture.follower, latest(picture), self._ring, colour)
+        at = (self._middle[0], self._words)
+        magnified(frame, self._unit, at, self._lens, self._ring, self._metre)
 
 
 def magnified(

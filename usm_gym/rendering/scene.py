@@ -28,7 +28,7 @@ from usm_gym.rendering.look import (
     outlines,
 )
 from usm_gym.rendering.panel import Panel
-from usm_gym.rendering.picture import AnyPicture, Picture, drift
+from usm_gym.rendering.picture import AnyPicture, Follower, Picture, drift
 
 GRID = 0.5
 # Length of a jet at the thruster's limit, m.
@@ -42,19 +42,19 @@ LENS_PAST = 2.0
 
 
 class Scene:
-    """A view of the water from above that moves along with the goal of the centre of mass."""
+    """A view of the water from above around the middle of what is shown."""
 
-    def __init__(self, area: pygame.Rect, unit: float, metre: float, goal: Points) -> None:
+    def __init__(self, area: pygame.Rect, unit: float, metre: float, middle: Points) -> None:
         """Prepare a view on an area, in points of `unit` pixels.
 
         Args:
             area: Where the view is.
             unit: Pixels in a point.
             metre: Points in a metre.
-            goal: Where in the area the goal is.
+            middle: Where in the area the middle of what is shown is.
         """
         self._panel = Panel(area, unit, WATER)
-        self._area, self._metre, self._goal = area, metre, goal
+        self._area, self._metre, self._middle = area, metre, middle
         self._path: Points | None = None
         self._dots = np.empty((0, 2))
 
@@ -70,23 +70,26 @@ class Scene:
         Args:
             frame: The frame.
             picture: The picture.
-            track: Colour of the track of the centre of mass.
+            track: Colour of the track of what follows the path.
             bar: Where a bar as long as the grid is wide ends; None for no bar.
         """
         panel = self._panel
         panel.clear()
-        self._origin = picture.path[picture.instants[-1]]
+        self._origin = picture.middle
         self._grid()
         self._current(picture)
-        for points in self._at(outlines(picture.robot, picture.reference)):
-            panel.outline(points, 1.5, OUTLINE)
+        if picture.reference is not None:
+            for points in self._at(outlines(picture.robot, picture.reference)):
+                panel.outline(points, 1.5, OUTLINE)
         self._jets(picture)
         self._body(picture)
         panel.disc(self._at(self._path_dots(picture.path)), 1.3, INK)
-        places = picture.path[picture.instants] + picture.errors
-        panel.line(self._at(thinned(places, 500)), 2.2, track)
-        cross_hair(panel, self._goal)
-        panel.centre_of_mass(self._at(places[-1]))
+        places = self._at(thinned(picture.track, 500))
+        panel.line(places, 2.2, track)
+        cross_hair(panel, self._at(picture.path[picture.instants[-1]]))
+        # The larger sign of the centre of mass hides the dot where that is what follows the path.
+        dot(panel, places[-1], track)
+        panel.centre_of_mass(self._at(picture.mass))
         if bar is not None:
             panel.line(np.stack([bar - (GRID * self._metre, 0.0), bar]), 1.5, GREY)
         panel.show(frame)
@@ -94,7 +97,7 @@ class Scene:
     def _view(self) -> tuple[Points, Points]:
         """The lower left and the upper right corner, m."""
         corners = np.array([self._area.bottomleft, self._area.topright])
-        low, high = self._origin + (corners - self._goal) * (1, -1) / self._metre
+        low, high = self._origin + (corners - self._middle) * (1, -1) / self._metre
         return low, high
 
     def _grid(self) -> None:
@@ -162,7 +165,7 @@ class Scene:
         return np.asarray(self._dots[seen])
 
     def _at(self, points: Points) -> Points:
-        return np.asarray(self._goal + (points - self._origin) * (self._metre, -self._metre))
+        return np.asarray(self._middle + (points - self._origin) * (self._metre, -self._metre))
 
 
 class Lens:
@@ -184,16 +187,29 @@ class Lens:
         panel.keep()
 
     def draw(
-        self, frame: pygame.Surface, errors: Points, scale: float, colour: Colour = TRAIL
+        self,
+        frame: pygame.Surface,
+        follower: Follower,
+        errors: Points,
+        scale: float,
+        colour: Colour = TRAIL,
     ) -> None:
-        """Draw the error and its last past, m, (n, 2), on a frame; `scale` is at the outer ring."""
+        """Draw an error on a frame.
+
+        Args:
+            frame: The frame.
+            follower: Whose error it is.
+            errors: The error and its last past, m, (n, 2).
+            scale: The error at the outer ring, m.
+            colour: Its colour.
+        """
         marks = errors / scale
         marks /= np.maximum(np.hypot(*marks.T), 1.0)[:, np.newaxis]
         points = self._middle + self.reach * marks * (1, -1)
         self._panel.clear()
         self._panel.line(thinned(points), 1.2, colour)
         arrow(self._panel, self._middle, points[-1], 2.2, colour)
-        self._panel.centre_of_mass(points[-1])
+        draw_follower(self._panel, follower, points[-1], colour)
         self._panel.show(frame)
 
 
@@ -203,9 +219,23 @@ def latest(picture: AnyPicture) -> Points:
 
 
 def cross_hair(panel: Panel, at: Points, size: float = 1.0) -> None:
-    """Draw the goal of the centre of mass."""
+    """Draw the goal of what follows the path."""
     for arm in np.array([(1.0, 0.0), (0.0, 1.0)]) * 15.0 * size:
         panel.line(np.stack([at - arm, at + arm]), 1.8, REFERENCE)
+
+
+def draw_follower(panel: Panel, follower: Follower, at: Points, colour: Colour) -> None:
+    """Draw what follows the path: a centre of mass by its usual sign, a head as a dot."""
+    if follower == "head":
+        dot(panel, at, colour)
+    else:
+        panel.centre_of_mass(at)
+
+
+def dot(panel: Panel, at: Points, colour: Colour) -> None:
+    """Draw a dot that stands out from a line or a body of its colour."""
+    panel.disc(at, 5.0, PAPER)
+    panel.disc(at, 3.8, colour)
 
 
 def arrow(panel: Panel, start: Points, tip: Points, width: float, colour: Colour) -> None:

@@ -25,6 +25,7 @@ from usm_gym.rendering.window import Window, _windows
 ID = "usm_gym:USM-Operation-v0"
 RESIDUAL = "usm_agents:USM-OperationResidual-v0"
 SPATIAL = "usm_gym:USM-Operation3D-v0"
+HEAD_IDS = ("usm_gym:USM-Head-v0", "usm_gym:USM-Head3D-v0")
 
 
 def vector(count, id=ID, **arguments):
@@ -123,7 +124,7 @@ def test_the_scale_of_the_error_is_round_and_large_enough():
         assert error_scale(np.array([[0.0, -largest]])) == pytest.approx(scale)
 
 
-@pytest.mark.parametrize("id", [ID, SPATIAL])
+@pytest.mark.parametrize("id", [ID, SPATIAL, *HEAD_IDS])
 def test_rendering_does_not_touch_the_physics(id):
     plain, rendered = gym.make(id), gym.make(id, render_mode="rgb_array")
     for env in (plain, rendered):
@@ -136,7 +137,7 @@ def test_rendering_does_not_touch_the_physics(id):
         assert (before == after).all()
 
 
-@pytest.mark.parametrize("id", [ID, SPATIAL])
+@pytest.mark.parametrize("id", [ID, SPATIAL, *HEAD_IDS])
 def test_a_robot_that_is_lost_is_drawn(id):
     # Not finite; half a metre away.
     for conditions in ({"integrator": "explicit", "physics_step": 0.02}, "field"):

@@ -1,7 +1,7 @@
 "use strict";
 
 // The look of the films (usm_gym/rendering.py).
-const METRES = 2.78; // width of the scene
+const METRES = { "centre of mass": 2.78, head: 3.14 }; // width of the scene, by what follows the path
 const JET_LENGTH = 0.36; // of a jet at the thruster's limit, m
 const LENS_PAST = 2; // how much of the past the lens shows, s
 const GRID = 0.5;
@@ -36,8 +36,13 @@ function rowAt(rows, place, smooth) {
   return rows[before].map((value, k) => value + (at - before) * (rows[before + 1][k] - value));
 }
 
-/** Centres of the links about a centre of mass, m. */
-function linkCentres(theta, length, [x, y]) {
+// Where a view is centred, by what follows the path: at its reference, or at the station.
+const MIDDLES = { "centre of mass": (reference) => reference, head: (reference) => reference.map(() => 0) };
+// How what follows the path is marked.
+const MARKS = { "centre of mass": centreOfMass, head: spot };
+
+/** Centres of the links and of mass, m; what follows the path is at a place. */
+function linkCentres(theta, length, place, follower) {
   const centres = [];
   let [alongX, alongY] = [0, 0];
   for (const angle of theta) {
@@ -46,7 +51,9 @@ function linkCentres(theta, length, [x, y]) {
     [alongX, alongY] = [alongX + dx, alongY + dy];
   }
   const mean = [0, 1].map((k) => centres.reduce((sum, each) => sum + each[k], 0) / centres.length);
-  return centres.map((each) => [each[0] - mean[0] + x, each[1] - mean[1] + y]);
+  const at = { "centre of mass": mean, head: [alongX, alongY] }[follower];
+  const moved = (point) => point.map((part, axis) => part - at[axis] + place[axis]);
+  return { centres: centres.map(moved), mass: moved(mean) };
 }
 
 /** A round number, m, that errors up to `largest` fit into. */
@@ -105,6 +112,18 @@ function centreOfMass(context, [x, y], radius, ink, paper) {
     context.arc(x, y, radius, start * Math.PI, (start + 0.5) * Math.PI);
     context.fill();
   }
+}
+
+/** A disc that stands out from a line or a body of its colour. */
+function spot(context, at, radius, ink, paper) {
+  disc(context, at, 0.8 * radius, paper);
+  disc(context, at, 0.6 * radius, ink);
+}
+
+/** The goal of what follows the path. */
+function crossHair(context, [x, y], arm, colour) {
+  line(context, [[x - arm, y], [x + arm, y]], colour, 2);
+  line(context, [[x, y - arm], [x, y + arm]], colour, 2);
 }
 
 /** A jet; a flow of length one is that at the thruster's limit. */

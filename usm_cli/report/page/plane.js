@@ -12,7 +12,7 @@ VIEWS.plane = class {
 
   /** Pixels in a metre. */
   get metre() {
-    return this.canvas.clientWidth / METRES;
+    return this.canvas.clientWidth / METRES[this.data.follower];
   }
 
   /** An error as it is seen: to the right and up. */
@@ -33,23 +33,26 @@ VIEWS.plane = class {
     const { context, width, height } = fitted(this.canvas, 0.43);
     if (!width) return;
     const place = time / this.data.frame;
-    const { reference: here, position } = this.replay.placeAt(episode, time);
+    const { reference: here, middle, position } = this.replay.placeAt(episode, time);
     const metre = this.metre;
-    const at = ([x, y]) => [width / 2 + (x - here[0]) * metre, height / 2 - (y - here[1]) * metre];
-    this.drawGrid(context, here, at, width / metre / 2, height / metre / 2);
-    const { length } = this.data.robot;
+    const at = ([x, y]) => [width / 2 + (x - middle[0]) * metre, height / 2 - (y - middle[1]) * metre];
+    this.drawGrid(context, middle, at, width / metre / 2, height / metre / 2);
+    const { follower, robot: { length } } = this.data;
     if (this.replay.reference) {
       const theta = rowAt(this.replay.reference, place, true);
-      this.outlines(theta, linkCentres(theta, length, here)).forEach((link) =>
+      this.outlines(theta, linkCentres(theta, length, here, follower).centres).forEach((link) =>
         shape(context, link.map(at), null, style("--reference"), 1.5));
     }
     const theta = rowAt(episode.posture, place, true);
-    const centres = linkCentres(theta, length, position);
+    const { centres, mass } = linkCentres(theta, length, position, follower);
     if (episode.thrust) this.drawJets(context, theta, centres, rowAt(episode.thrust, place, false), metre, at);
     this.drawBody(context, theta, centres, metre, at);
     this.dots.forEach((dot) => disc(context, at(dot), 1.3, style("--ink")));
     line(context, this.replay.trail(episode, time).map(at), style("--track"), 2.2);
-    centreOfMass(context, at(position), 6, style("--ink"), style("--surface"));
+    if (follower === "head") crossHair(context, at(here), 15, style("--reference"));
+    // The larger sign of the centre of mass hides the spot where that is what follows the path.
+    spot(context, at(position), 6, style("--track"), style("--surface"));
+    centreOfMass(context, at(mass), 6, style("--ink"), style("--surface"));
     this.drawMeasures(context, width, height, metre);
     drawLoss(context, this.replay);
   }

@@ -22,8 +22,12 @@ function turnAbout(axis, angle) {
   return [Math.cos(angle / 2), ...axis.map((part) => Math.sin(angle / 2) * part)];
 }
 
-/** Turns and centres of the links, whose centre of mass is at a place, m; as `link_poses` does it. */
-function linkPoses({ lengths, masses, keels, jointAxes }, posture, mass) {
+/**
+ * Turns and centres of the links, m, as `link_poses` has them, and the centre of mass.
+ *
+ * What follows the path is at a place.
+ */
+function linkPoses({ lengths, masses, keels, jointAxes }, posture, place, follower) {
   const root = lengths.length >> 1;
   const size = Math.hypot(...posture.slice(0, 4));
   const turns = [];
@@ -47,8 +51,7 @@ function linkPoses({ lengths, masses, keels, jointAxes }, posture, mass) {
     const keel = turned(turns[k], [0, 0, -keels[k]]);
     centre.forEach((part, axis) => { middle[axis] += (masses[k] / total) * (part + keel[axis]); });
   });
-  return turns.map((turn, k) => ({
-    turn,
-    centre: centres[k].map((part, axis) => part - middle[axis] + mass[axis]),
-  }));
+  const at = { "centre of mass": middle, head: end }[follower];
+  const moved = (point) => point.map((part, axis) => part - at[axis] + place[axis]);
+  return { poses: turns.map((turn, k) => ({ turn, centre: moved(centres[k]) })), mass: moved(middle) };
 }

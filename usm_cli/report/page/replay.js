@@ -109,14 +109,15 @@ class Replay {
     this.movePlayheads();
   }
 
-  /** Where the reference is, and how far from it an episode is, m. */
+  /** Where the reference is, the middle of the view, and what follows the path, m. */
   placeAt(episode, time) {
     const reference = rowAt(this.path, time / this.data.frame, true);
     const error = rowAt(episode.error, this.sample(time), true);
-    return { reference, position: reference.map((part, axis) => part + error[axis]) };
+    const middle = MIDDLES[this.data.follower](reference);
+    return { reference, middle, position: reference.map((part, axis) => part + error[axis]) };
   }
 
-  /** Where an episode has been up to a time, m. */
+  /** Where what follows the path has been up to a time, m. */
   trail(episode, time) {
     const past = this.path.slice(0, Math.floor(time / this.data.frame) + 1);
     return [...past.map((_, k) => this.placeAt(episode, k * this.data.frame).position), this.placeAt(episode, time).position];
@@ -126,7 +127,7 @@ class Replay {
     return episode.lost && this.sample(time) >= episode.error.length - 1;
   }
 
-  /** The error of the centre of mass, magnified; the reference is in the middle. */
+  /** The error of what follows the path, magnified; the reference is in the middle. */
   drawLens() {
     const { context, width } = fitted(this.find(".lens"), 1);
     if (!width) return;
@@ -152,7 +153,7 @@ class Replay {
       const last = clamp(Math.round(this.sample(this.time)), 0, episode.error.length - 1);
       const first = Math.max(0, last - Math.round(LENS_PAST / this.data.period));
       line(context, episode.error.slice(first, last + 1).map(mark), style(colour), 1.5);
-      centreOfMass(context, mark(episode.error[last]), 5, style(colour), style("--surface"));
+      MARKS[this.data.follower](context, mark(episode.error[last]), 5, style(colour), style("--surface"));
     }
     const times = three(reach / this.scale / this.view.metre);
     this.find(".lens-scale").textContent =

@@ -4,9 +4,9 @@
 const LIGHT = [-0.25, 0.25, 0.94];
 const [BRIGHTNESS, DARKEST] = [1.15 * Math.PI, 0.17];
 const [SHADE, GHOST, JET] = [0.3, 0.34, 0.72]; // opacities
-// The water's arrows, over the robot's length: their distances, how far from the reference they are,
+// The water's arrows, over the robot's length: their distances, how far from the middle they are,
 // the longest one and their width; how far the water moves along an arrow, s.
-const [APART, AROUND_GOAL, LONGEST, BREADTH] = [[0.3, 0.3, 0.22], 0.9, 0.09, 0.006];
+const [APART, AROUND_MIDDLE, LONGEST, BREADTH] = [[0.3, 0.3, 0.22], 0.9, 0.09, 0.006];
 const SECONDS = 4;
 const ARROW = [[-0.5, 0], [-0.5, 0.3], [0.1, 0.3], [0.1, 1], [0.5, 0]]; // over its length and width
 const MOST_ARROWS = 400;
@@ -85,7 +85,7 @@ class SolidScene {
     });
   }
 
-  /** Lines that fade away from the reference, and the path on the floor. */
+  /** Lines that fade away from the middle, and the path on the floor. */
   addFloor() {
     const { grid, length, replay, floor } = this.view;
     const reach = REACH * length;
@@ -155,7 +155,7 @@ class SolidScene {
     this.renderer.render(this.scene, this.camera);
   }
 
-  pose({ poses, wanted, thrust, reference, position }) {
+  pose({ poses, wanted, thrust, middle, position }) {
     const put = (thing, { turn: [w, x, y, z], centre }) => {
       thing.quaternion.set(x, y, z, w);
       thing.position.set(...centre);
@@ -163,7 +163,8 @@ class SolidScene {
     this.links.forEach(({ body, shadow, ghost }, k) => {
       put(body, poses[k]);
       put(shadow, poses[k]);
-      put(ghost, wanted[k]);
+      ghost.visible = Boolean(wanted);
+      if (wanted) put(ghost, wanted[k]);
     });
     this.view.data.robot.jets.forEach(({ at, direction, mouth }, k) => {
       const flow = direction.map((part) => -Math.sign(thrust[k]) * part);
@@ -174,13 +175,13 @@ class SolidScene {
       jet.scale.set(Math.abs(thrust[k]) || 1, 1, 1);
     });
     const { grid, floor } = this.view;
-    this.floor.position.set(Math.round(reference[0] / grid) * grid, Math.round(reference[1] / grid) * grid, floor);
+    this.floor.position.set(Math.round(middle[0] / grid) * grid, Math.round(middle[1] / grid) * grid, floor);
     const ends = this.drop.geometry.getAttribute("position");
     ends.set([...position, position[0], position[1], floor]);
     ends.needsUpdate = true;
   }
 
-  placeStream({ reference, place }) {
+  placeStream({ middle, place }) {
     const { length, floor, replay } = this.view;
     const velocity = rowAt(replay.current, place, true);
     const drift = rowAt(this.drifts, place, true);
@@ -190,16 +191,16 @@ class SolidScene {
       new THREE.Vector3(1, 0, 0), new THREE.Vector3(...velocity).normalize());
     const broad = Math.min(BREADTH * length, 0.25 * long);
     const step = APART.map((part) => part * length);
-    const reach = AROUND_GOAL * length;
+    const reach = AROUND_MIDDLE * length;
     const range = [0, 1, 2].map((axis) => [-1, 1].map((side) =>
-      Math.round((reference[axis] - drift[axis] + side * reach) / step[axis])));
+      Math.round((middle[axis] - drift[axis] + side * reach) / step[axis])));
     let count = 0;
     const each = (axis, act) => { for (let k = range[axis][0]; k <= range[axis][1]; k += 1) act(k); };
     each(0, (i) => each(1, (j) => each(2, (k) => {
       // Every second row and layer is shifted, so that the arrows do not stand in ranks.
       const cell = [i + 0.5 * Math.abs(j % 2), j + 0.5 * Math.abs(k % 2), k];
       const at = cell.map((part, axis) => part * step[axis] + drift[axis]);
-      const far = Math.hypot(...at.map((part, axis) => part - reference[axis])) / reach;
+      const far = Math.hypot(...at.map((part, axis) => part - middle[axis])) / reach;
       if (far >= 1 || at[2] < floor || count === MOST_ARROWS || speed === 0) return;
       const wide = broad * (1 - far ** 2);
       this.stream.setMatrixAt(count, new THREE.Matrix4().compose(

@@ -14,7 +14,8 @@ VIEWS.space = class {
     this.seen = "Error as seen from here";
     this.length = this.data.robot.lengths.reduce((sum, each) => sum + each, 0);
     this.grid = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5].filter((mark) => mark <= this.length / 6).pop() ?? 0.01;
-    this.floor = Math.min(...replay.path.map((point) => point[2])) - FLOOR * this.length;
+    const heights = replay.path.flatMap((point) => [point[2], MIDDLES[this.data.follower](point)[2]]);
+    this.floor = Math.min(...heights) - FLOOR * this.length;
     this.dots = this.pathDots(replay.path);
     this.camera = new Camera(replay.find(".water"), this.length, () => replay.draw());
     const solid = replay.find(".solid");
@@ -36,7 +37,7 @@ VIEWS.space = class {
     }
   }
 
-  /** Pixels in a metre at the reference. */
+  /** Pixels in a metre in the middle. */
   get metre() {
     return this.camera.metre;
   }
@@ -60,13 +61,14 @@ VIEWS.space = class {
     const { context, width, height } = fitted(this.canvas, this.canvas.clientWidth < 560 ? 0.85 : 0.52);
     if (!width) return;
     const place = time / this.data.frame;
-    const { reference, position } = this.replay.placeAt(episode, time);
-    this.camera.aim([...reference], width, height);
-    const { robot } = this.data;
+    const { reference, middle, position } = this.replay.placeAt(episode, time);
+    this.camera.aim([...middle], width, height);
+    const { robot, follower } = this.data;
+    const asked = this.replay.reference;
     const now = {
-      reference, position, place,
-      poses: linkPoses(robot, rowAt(episode.posture, place, true), position),
-      wanted: linkPoses(robot, rowAt(this.replay.reference, place, true), reference),
+      reference, middle, position, place,
+      ...linkPoses(robot, rowAt(episode.posture, place, true), position, follower),
+      wanted: asked && linkPoses(robot, rowAt(asked, place, true), reference, follower).poses,
       thrust: rowAt(episode.thrust, place, false),
     };
     if (this.solid) this.solid.draw(now, width, height);
@@ -78,8 +80,8 @@ VIEWS.space = class {
     drawLoss(context, this.replay);
   }
 
-  /** Path, track, centre of mass and its goal, over everything. */
-  drawMarks(context, { reference, position }, trail) {
+  /** Path, track, what follows the path, its goal and the centre of mass, over everything. */
+  drawMarks(context, { reference, position, mass }, trail) {
     const { camera } = this;
     for (const dot of this.dots) {
       const [x, y, depth] = camera.see(dot);
@@ -94,8 +96,11 @@ VIEWS.space = class {
       });
       for (const part of camera.seeLine(ends)) line(context, part, style("--reference"), 2);
     }
-    const [x, y, depth] = camera.see(position);
-    if (depth > camera.near) centreOfMass(context, [x, y], 6, style("--ink"), style("--surface"));
+    // The larger sign of the centre of mass hides the spot where that is what follows the path.
+    for (const [mark, point, ink] of [[spot, position, "--track"], [centreOfMass, mass, "--ink"]]) {
+      const [x, y, depth] = camera.see(point);
+      if (depth > camera.near) mark(context, [x, y], 6, style(ink), style("--surface"));
+    }
   }
 
   /** The directions of the axes in a corner. */
@@ -127,9 +132,9 @@ VIEWS.space = class {
   }
 
   /** The robot and the floor as lines, where there is no WebGL. */
-  drawPlainly(context, { reference, poses }) {
+  drawPlainly(context, { middle, poses }) {
     const { camera, grid, floor } = this;
-    const [x, y] = [0, 1].map((axis) => Math.round(reference[axis] / grid) * grid);
+    const [x, y] = [0, 1].map((axis) => Math.round(middle[axis] / grid) * grid);
     const reach = Math.round(this.length / grid) * grid;
     for (let k = -reach; k <= reach + grid / 2; k += grid) {
       const lines = [[[x + k, y - reach, floor], [x + k, y + reach, floor]], [[x - reach, y + k, floor], [x + reach, y + k, floor]]];

@@ -11,7 +11,7 @@ from usm_gym.rendering.space.picture import SpatialPicture
 
 Array = NDArray[np.float64]
 
-# Over the robot's length: how far off the camera is, how far below the reference it aims, and what
+# Over the robot's length: how far off the camera is, how far below the middle it aims, and what
 # is too near to be seen.
 DISTANCE, LOWERED, NEAR = 1.38, 0.035, 0.03
 # The camera stands behind the robot, to its right and above it: its direction from the robot.
@@ -59,9 +59,9 @@ def orbiting(
 
 
 def following(picture: SpatialPicture) -> Camera:
-    """The camera that moves along with the reference, and so as smoothly as that."""
+    """The camera that moves along with the middle of a picture, and so as smoothly as that."""
     length = float(picture.robot.lengths.sum())
-    return orbiting(picture.reference - (0.0, 0.0, LOWERED * length), DISTANCE * length)
+    return orbiting(picture.middle - (0.0, 0.0, LOWERED * length), DISTANCE * length)
 
 
 class View:

@@ -63,7 +63,7 @@ class SpatialCanvas:
             picture: The picture.
             title: The words above it.
             scale: The largest error in the chart, m; None fits the errors so far.
-            camera: Where it is seen from; None moves along with the reference.
+            camera: Where it is seen from; None moves along with the middle of the picture.
 
         Returns:
             Red, green and blue, (height, width, 3).
@@ -74,7 +74,7 @@ class SpatialCanvas:
             self._episode = (*shared, picture.limit, scale)
             self._frame.fill(PAPER)
             self._legend(picture)
-            self._chart.prepare(self._frame, *shared, scale)
+            self._chart.prepare(self._frame, picture.follower, *shared, scale)
             self._still = self._frame.copy()
         self._frame.blit(self._still, (0, 0))
         view = self._scene.draw(self._frame, picture, camera or following(picture))
@@ -123,12 +123,12 @@ class SpatialCanvas:
         signs: list[legend.Sign] = [
             ("head", 16, legend.head),
             ("centre of mass", 14, legend.mass),
-            ("its goal", 18, legend.goal),
+            (legend.GOALS[picture.follower], 18, legend.goal),
             ("path", 20, legend.path),
             ("track", 18, legend.track),
-            ("reference", 20, legend.wanted),
-            (f"thrust, up to {picture.limit:g} N", 20, legend.thrust),
         ]
+        signs += [("reference", 20, legend.wanted)] if picture.wanted else []
+        signs.append((f"thrust, up to {picture.limit:g} N", 20, legend.thrust))
         signs += [("joints bend", 6, legend.shift)] if picture.shifts else []
         legend.legend(self._frame, self._unit, (14.0, LEGEND), signs)
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from usm_gym.rendering.picture import Follower
 from usm_gym.spatial_posture import roll_pitch_yaw
 from usm_gym.spatial_robot import SpatialRobot
 
@@ -35,33 +36,39 @@ class SpatialPicture:
         time: Time since the start, s.
         body: The robot's true pose.
         wanted: The pose with the reference joint angles at the reference of the attitude, its
-            centre of mass at the reference of the position.
+            centre of mass at the reference of the position; None where no pose is asked for.
         thrust: Forces of the thrusters over their limit, (thrusters,).
         limit: The limit, N.
         current: Velocity of the water, m/s, (3,).
         drift: How far the water has moved since the start, m, (3,).
-        path: Reference of the centre of mass at some instants of the whole episode, m, (k, 3).
+        path: Reference of what follows it at some instants of the whole episode, m, (k, 3).
         reference: Its reference now, m, (3,).
+        middle: The point around which the robot is shown: the reference now, or the station, where
+            the centre of mass starts, of a robot that stays there, m, (3,).
+        mass: The true centre of mass, m, (3,).
         times: The instants recorded so far, in ascending order, s, (n,); the last one is now.
-        track: The true centre of mass at these instants, m, (n, 3).
+        track: Where the follower was at these instants, m, (n, 3).
         errors: The true position errors at these instants, m, (n, 3).
         max_error: Largest absolute error after settling, m, (3,).
         duration: Duration of the episode, s.
         settle_time: When the scored part of the episode begins, s.
         shifts: When the joints start to move, s.
         lost: Whether the robot is lost.
+        follower: What has to follow the path.
     """
 
     robot: SpatialRobot
     time: float
     body: Pose
-    wanted: Pose
+    wanted: Pose | None
     thrust: Array
     limit: float
     current: Array
     drift: Array
     path: Array
     reference: Array
+    middle: Array
+    mass: Array
     times: Array
     track: Array
     errors: Array
@@ -70,6 +77,7 @@ class SpatialPicture:
     settle_time: float = 0.0
     shifts: tuple[float, ...] = ()
     lost: bool = False
+    follower: Follower = "centre of mass"
 
     @property
     def attitude(self) -> Array:

@@ -41,6 +41,6 @@ class SpatialRow:
         """Draw a picture on a frame, the track in a colour."""
         view = self._scene.draw(frame, picture, following(picture), colour)
         errors = view.turned(latest(picture)) * (1, -1)
-        self._lens.draw(frame, errors, self._ring, colour)
-        at, metre = (self._middle[0], self._words), view.metre(picture.reference)
+        self._lens.draw(frame, picture.follower, errors, self._ring, colour)
+        at, metre = (self._middle[0], self._words), view.metre(picture.middle)
         magnified(frame, self._unit, at, self._lens, self._ring, metre)

@@ -20,7 +20,7 @@ from usm_gym.rendering.look import (
     faded,
 )
 from usm_gym.rendering.panel import MIDDLE, Panel, write
-from usm_gym.rendering.scene import arrow, thinned
+from usm_gym.rendering.scene import arrow, dot, thinned
 from usm_gym.rendering.space.body import body, hull, jets
 from usm_gym.rendering.space.camera import NEAR, Camera, View
 from usm_gym.rendering.space.mesh import Mesh
@@ -49,7 +49,7 @@ FLOOR, REACH = 0.16, 2.6
 # Steps in which they fade.
 FADES = 16
 GRID_LINE, GROUND, PATH_SHADOW = (176, 199, 211), (226, 238, 244), (128, 158, 174)
-# The water's arrows, over the robot's length: their distances, how far from the reference they are,
+# The water's arrows, over the robot's length: their distances, how far from the middle they are,
 # the longest one, and half an arm of the goal's cross; how far the water moves along an arrow, s.
 SPACING, AROUND, LONGEST, ARM = np.array([0.3, 0.3, 0.22]), 0.9, 0.09, 0.045
 SECONDS = 4.0
@@ -88,7 +88,7 @@ class SpatialScene:
             frame: The frame.
             picture: The picture.
             camera: The camera.
-            track: Colour of the track of the centre of mass.
+            track: Colour of the track of what follows the path.
         """
         if picture.robot is not self._robot:
             self._robot = picture.robot
@@ -97,18 +97,20 @@ class SpatialScene:
             self.grid = max(mark for mark in MARKS if mark <= self._length / 6)
         area = self._area
         view = self._view = View(camera, area.center, area.width, NEAR * self._length)
-        self._floor = float(picture.path[:, 2].min()) - FLOOR * self._length
+        deepest = min(picture.path[:, 2].min(), picture.middle[2])
+        self._floor = float(deepest) - FLOOR * self._length
         self._water()
         self._lines(picture)
         self._shadow(self._hull.posed(*picture.body))
         self._path(picture)
-        self._ghost(self._hull.posed(*picture.wanted))
+        if picture.wanted is not None:
+            self._ghost(self._hull.posed(*picture.wanted))
         mesh = self._body.posed(*picture.body)
         paint(self._panel, self._view, mesh, self._jets(picture) + self._stream(picture))
         self._marks(picture, track)
         words = []
         if self._measured:
-            words = [*self._axes(), *self._bar(view.metre(picture.reference))]
+            words = [*self._axes(), *self._bar(view.metre(picture.middle))]
         self._panel.show(frame)
         for word, at, colour in words:
             write(frame, self._unit, word, at, 10, colour, MIDDLE)
@@ -121,8 +123,8 @@ class SpatialScene:
         self._panel.shades(np.stack(hues, axis=1))
 
     def _lines(self, picture: SpatialPicture) -> None:
-        """Draw the floor's grid, which fades away from the reference."""
-        middle, reach = picture.reference[:2], REACH * self._length
+        """Draw the floor's grid, which fades away from the middle."""
+        middle, reach = picture.middle[:2], REACH * self._length
         low, high = (np.rint((middle + side * reach) / self.grid) for side in (-1, 1))
         marks = [np.arange(low[k], high[k] + 1) * self.grid for k in (0, 1)]
         parts = []
@@ -178,16 +180,16 @@ class SpatialScene:
         return tasks
 
     def _lattice(self, picture: SpatialPicture) -> list[tuple[Points, float]]:
-        """Places around the reference that drift with the water, and how near to it they are."""
+        """Places around the middle that drift with the water, and how near to it they are."""
         spacing = SPACING * self._length
-        middle = picture.reference - picture.drift
+        middle = picture.middle - picture.drift
         low, high = (np.rint((middle + side * AROUND * self._length) / spacing) for side in (-1, 1))
         axes = [np.arange(low[k], high[k] + 1) for k in range(3)]
         cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         # Every second row and layer is shifted, so that the arrows do not stand in ranks.
         cells[:, :2] += 0.5 * (cells[:, [1, 2]] % 2)
         places = cells * spacing + picture.drift
-        far = np.linalg.norm((places - picture.reference) / (AROUND * self._length), axis=1)
+        far = np.linalg.norm((places - picture.middle) / (AROUND * self._length), axis=1)
         seen = (far < 1) & (places[:, 2] > self._floor)
         return list(zip(places[seen], (1 - far[seen] ** 2).tolist(), strict=True))
 
@@ -197,7 +199,7 @@ class SpatialScene:
         return lambda: arrow(self._panel, start, tip, 1.0, colour)
 
     def _path(self, picture: SpatialPicture) -> None:
-        """Draw the path on the floor, and how high above it the centre of mass is."""
+        """Draw the path on the floor, and how high above it that is what follows it."""
         fallen = thinned(picture.path, 400).copy()
         fallen[:, 2] = self._floor
         foot = picture.track[-1].copy()
@@ -209,10 +211,10 @@ class SpatialScene:
             self._panel.disc(self._view.see(foot), 2.5, PATH_SHADOW)
 
     def _marks(self, picture: SpatialPicture, track: Colour) -> None:
-        """Draw path, track, centre of mass and its goal, over everything."""
+        """Draw path, track, what follows the path, its goal and the centre of mass, on top."""
         panel, view = self._panel, self._view
         dots = self._dots(picture.path)
-        close = np.linalg.norm(dots - picture.reference, axis=1) < REACH * self._length
+        close = np.linalg.norm(dots - picture.middle, axis=1) < REACH * self._length
         dots = dots[close & (view.depth(dots) > view.near)]
         if len(dots):
             panel.disc(view.see(dots), 1.3, INK)
@@ -222,9 +224,11 @@ class SpatialScene:
         for axis in np.eye(3):
             for part in view.see_line(picture.reference + arm * np.outer((-1, 1), axis)):
                 panel.line(part, 1.8, REFERENCE)
-        mass = picture.track[-1]
-        if view.depth(mass) > view.near:
-            panel.centre_of_mass(view.see(mass))
+        # The larger sign of the centre of mass hides the dot where that is what follows the path.
+        if view.depth(picture.track[-1]) > view.near:
+            dot(panel, view.see(picture.track[-1]), track)
+        if view.depth(picture.mass) > view.near:
+            panel.centre_of_mass(view.see(picture.mass))
 
     def _axes(self) -> list[Word]:
         """Draw the directions of the global axes in a corner; return their letters."""
@@ -239,7 +243,7 @@ class SpatialScene:
         return words
 
     def _bar(self, metre: float) -> list[Word]:
-        """Draw how long the width of the floor's grid is at the reference; return its length."""
+        """Draw how long the width of the floor's grid is in the middle; return its length."""
         length = self.grid * metre
         if length > self._area.width / 2:
             return []

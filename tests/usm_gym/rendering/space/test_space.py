@@ -41,6 +41,8 @@ def picture(angles=(0.0,) * 8, **changes):
         drift=np.zeros(3),
         path=path,
         reference=np.zeros(3),
+        middle=np.zeros(3),
+        mass=np.zeros(3),
         times=times,
         track=path[: len(times)],
         errors=np.zeros((len(times), 3)),
@@ -199,8 +201,8 @@ def test_the_same_picture_has_the_same_bytes_at_any_size():
         np.testing.assert_array_equal(other.draw(shown, "a robot"), first)
 
 
-def test_the_camera_keeps_its_place_beside_the_reference():
-    here, there = (following(picture(reference=np.array(at))) for at in ((0, 0, 0), (3.0, 1, -2)))
+def test_the_camera_keeps_its_place_beside_the_middle():
+    here, there = (following(picture(middle=np.array(at))) for at in ((0, 0, 0), (3.0, 1, -2)))
     np.testing.assert_allclose(there.position - here.position, (3, 1, -2))
     behind, left, above = here.position
     assert behind < 0
