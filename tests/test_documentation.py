@@ -152,7 +152,8 @@ def test_the_pictures_of_the_pages_are_what_their_command_draws():
 
 
 def test_every_law_has_its_place_among_the_controllers():
-    text = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    pages = [ROOT / "docs" / name for name in ("controllers.md", "tasks_head.md")]
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
     shown = {id for ids in re.findall(r"<!-- law: (.+?) -->", text) for id in ids.split(", ")}
     laws = {id for id in usm_baselines.ids() if not (PRETRAINED / id).exists()} - {
         "zero",

@@ -14,6 +14,7 @@ from usm_gym.support.text import figures as in_figures
 from usm_gym.support.text import mm
 from usm_gym.support.validation import require
 from usm_gym.task.conditions import IN_SPACE
+from usm_gym.task.head_sampling import nominal_head
 
 # The suites whose scores are shown, by board.
 SHOWN = {
@@ -41,7 +42,9 @@ def filled(text):
 
 
 def law(ids, everyone):
-    """Gains, an episode and the scores of a law."""
+    """Gains of a law; of one for the body also an episode and the scores."""
+    if entry(ids[0]).moves_joints:
+        return gains(ids)
     shown = in_the_plane(shipped(ids))
     others = [id for id in everyone if id not in shown]
     names = ", ".join(f"<code>{id}</code>" for id in shown)
@@ -88,7 +91,8 @@ def gains(ids):
 
 def made(id):
     """The gains of a policy."""
-    return usm_baselines.make(id, figures.scenario().nominal).gains
+    scenario = nominal_head("head") if entry(id).moves_joints else figures.scenario()
+    return usm_baselines.make(id, scenario.nominal).gains
 
 
 def scores(board, ids):
