@@ -17,7 +17,8 @@ import numpy as np
 from usm_baselines.paper.paper_rate import Law, simulate
 from usm_baselines.registry import make
 
-from usm_gym.evaluation import Trajectory, evaluate, rollout
+from usm_gym.evaluation import evaluate, rollout
+from usm_gym.recording import Trajectory
 from usm_gym.robot import Robot, Thruster
 from usm_gym.simulation import Simulation
 from usm_gym.suites import suite

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from usm_baselines.contender import Contender
 
-from usm_gym.evaluation import Trajectory, rollout
+from usm_gym.evaluation import rollout
+from usm_gym.recording import Trajectory
 from usm_gym.rendering.depiction import depiction_of
 from usm_gym.simulation import Simulation
 from usm_gym.support.validation import UsageError, in_one_line

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from usm_gym.kernels.lanes import padded
 from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout
-from usm_gym.plant.chain import Plant, accelerate_all
+from usm_gym.plant.chain import accelerate_all
+from usm_gym.plant.plant import Plant
 from usm_gym.robot import Drag, Hydrodynamics, Robot
 from usm_gym.support.validation import UsageError, brief, real_array, require
 

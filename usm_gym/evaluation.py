@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from usm_gym.policy import as_action, is_privileged, nominal_of
+from usm_gym.recording import Recording, Trajectory, at_rest
 from usm_gym.robot import Robot
 from usm_gym.simulation import Simulation
 from usm_gym.statistics import mean_interval
@@ -22,8 +23,6 @@ from usm_gym.world import World, world_of
 
 # Episodes that a policy meets side by side; a multiple of the plant's lanes.
 BATCH = 64
-# What side by side is kept of all episodes: some three gigabytes.
-MOST_SAMPLES = 50_000_000
 # Per axis.
 POSITION_METRICS = ("max_error", "settled_error", "rms_error")
 THRUST_METRICS = ("thrust_effort", "thrust_variation", "saturation_share")
@@ -38,30 +37,6 @@ SHIFT_METRICS = {
 }
 # The row of an episode that is no metric.
 FAILED = "failed"
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """What happened in an episode, at the control instants after each step, up to a loss.
-
-    Attributes:
-        scenario: The episode's scenario.
-        time: Times, s, (samples,).
-        error: True position errors, m, (samples, axes).
-        attitude_error: Attitude errors, rad, (samples, angles).
-        command: Thruster commands after saturation, N, (samples, thrusters).
-        joint_rates: Commanded rates of the joints that a policy moves, rad/s, (samples, joints); no
-            joints where it moves none.
-        lost: Whether the robot was lost.
-    """
-
-    scenario: Any
-    time: NDArray[np.float64]
-    error: NDArray[np.float64]
-    attitude_error: NDArray[np.float64]
-    command: NDArray[np.float64]
-    joint_rates: NDArray[np.float64]
-    lost: bool
 
 
 @dataclass(frozen=True)
@@ -143,7 +118,7 @@ def evaluate(
         scenarios = [dataclasses.replace(scenario, robot=robot) for scenario in scenarios]
     for scenario in scenarios:
         _require_fit(policy, scenario)
-        score(_at_rest(scenario))  # refuses an episode that leaves nothing to score
+        score(at_rest(scenario))  # refuses an episode that leaves nothing to score
     chunks = [scenarios[part] for part in batches(len(scenarios), workers)]
     if workers == 1:
         rows = [row for chunk in chunks for row in _scores(policy, chunk, report)]
@@ -259,61 +234,6 @@ def _position_errors(trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
     return dict(zip(names, values, strict=True))
 
 
-class _Recording:
-    """What happens in a simulation, robot by robot up to its end or loss."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        """Make room for all control periods."""
-        size, length = simulation.size, int(simulation.steps.max())
-        require(
-            size * length <= MOST_SAMPLES,
-            "scenarios",
-            f"{size} episodes of up to {length} control periods",
-            f"{MOST_SAMPLES} control periods side by side",
-        )
-        self.length = length
-        self.lost = np.zeros(size, bool)
-        self._simulation = simulation
-        self._ends = simulation.steps.copy()
-        self._error = np.empty((length, *simulation.error.shape))
-        self._attitude_error = np.empty((length, *simulation.attitude_error.shape))
-        world = simulation.world
-        self._command = np.empty((length, size, world.thrusters))
-        self._joint_rates = np.empty((length, size, world.actions - world.thrusters))
-
-    def alive(self, period: int) -> NDArray[np.bool_]:
-        """Whose episodes are going on in a control period."""
-        return (period < self._ends) & ~self.lost
-
-    def note(self, period: int) -> None:
-        """Take down a control period that has just passed."""
-        simulation = self._simulation
-        self._error[period] = simulation.error
-        self._attitude_error[period] = simulation.attitude_error
-        self._command[period] = simulation.read("command")
-        if self._joint_rates.size > 0:
-            self._joint_rates[period] = simulation.read("joint_commands")
-        now = simulation.lost & self.alive(period)
-        self._ends[now] = period + 1
-        self.lost |= now
-
-    def trajectories(self) -> list[Trajectory]:
-        """The episodes."""
-        scenarios = self._simulation.scenarios
-        return [
-            Trajectory(
-                scenario=scenario,
-                time=_times(scenario, int(end)),
-                error=self._error[:end, index],
-                attitude_error=self._attitude_error[:end, index],
-                command=self._command[:end, index],
-                joint_rates=self._joint_rates[:end, index],
-                lost=bool(self.lost[index]),
-            )
-            for index, (scenario, end) in enumerate(zip(scenarios, self._ends, strict=True))
-        ]
-
-
 def _run(
     policy: Any,
     scenarios: Sequence[Any],
@@ -324,7 +244,7 @@ def _run(
     _require_period(policy, scenarios[0].conditions.control_period)
     simulation = Simulation(scenarios)
     watch(simulation)
-    recording, size = _Recording(simulation), simulation.size
+    recording, size = Recording(simulation), simulation.size
     state: Any = None
     for k in range(recording.length):
         truth = {"snapshot": simulation.snapshot()} if is_privileged(policy) else {}
@@ -374,25 +294,6 @@ def _require_fit(policy: Any, scenario: Any) -> None:
             f"{shape}; a model of the residual task goes in as "
             "usm_agents.ResidualPolicy(env, model)",
         )
-
-
-def _at_rest(scenario: Any) -> Trajectory:
-    samples, world = scenario.steps, world_of(scenario.body)
-    return Trajectory(
-        scenario=scenario,
-        time=_times(scenario, samples),
-        error=np.zeros((samples, len(world.axes))),
-        attitude_error=np.zeros((samples, len(world.attitude) + len(world.watched))),
-        command=np.zeros((samples, world.thrusters)),
-        joint_rates=np.zeros((samples, world.actions - world.thrusters)),
-        lost=False,
-    )
-
-
-def _times(scenario: Any, samples: int) -> NDArray[np.float64]:
-    """The ends of the first control periods of an episode, s."""
-    period: float = scenario.conditions.control_period
-    return np.arange(1, samples + 1, dtype=np.float64) * period
 
 
 def _common(tables: Sequence[Mapping[str, Any]]) -> list[str]:

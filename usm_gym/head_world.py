@@ -16,7 +16,7 @@ from usm_gym.manipulator import Manipulator
 from usm_gym.packing import plant_of
 from usm_gym.planar_world import PlanarWorld
 from usm_gym.plant import layout as rows
-from usm_gym.plant.chain import Plant
+from usm_gym.plant.plant import Plant
 from usm_gym.plant.spatial import layout as spatial_rows
 from usm_gym.plant.spatial.links import SpatialPlant
 from usm_gym.plant.steering import ANGLE, QUANTITIES, steering_of, steering_row

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from usm_gym.plant import layout as rows
-from usm_gym.plant.chain import Plant
+from usm_gym.plant.plant import Plant
 from usm_gym.plant.references import NEVER, filter_coefficients
 from usm_gym.plant.steering import UNSTEERED, Steering
 from usm_gym.plant.thrusters import lag_shares

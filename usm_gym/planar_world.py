@@ -15,7 +15,7 @@ from usm_gym.kernels.compile import compiled, parallel, piece
 from usm_gym.kernels.lanes import WIDTH, block_at, spread
 from usm_gym.packing import body_row, plant_of
 from usm_gym.plant import layout as rows
-from usm_gym.plant.chain import Plant
+from usm_gym.plant.plant import Plant
 from usm_gym.plant.steering import steer
 from usm_gym.plant.step import advance
 from usm_gym.plant.thrusters import command

@@ -18,7 +18,8 @@ from usm_cli.selection import (
 )
 from usm_cli.take import instants, take
 from usm_cli.terminal import empty_table, output_console, progress_bar
-from usm_gym.evaluation import Trajectory, score
+from usm_gym.evaluation import score
+from usm_gym.recording import Trajectory
 from usm_gym.support.files import check_writable
 from usm_gym.support.text import mm
 from usm_gym.support.validation import UsageError, require
