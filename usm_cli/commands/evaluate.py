@@ -33,8 +33,8 @@ from usm_gym.support.text import counted
 from usm_gym.task.modes import AnyScenario
 
 DESCRIPTION = """\
-Score policies. The score of an episode is the largest true position error after settling (5 s, in
-scans 20 s), in each axis, as in Table 1 of the paper. All policies meet the same scenarios and the
+Score policies. The score of an episode is the largest true position error after settling (5 s, for
+the head 10 s, in scans 20 s), in each axis, as in Table 1 of the paper. All policies meet the same scenarios and the
 same noise. Prints means over episodes, best first, and who wins; the wider the terminal, the more
 columns. A lost robot counts 0.5 m or more in both axes. Where robots are lost, and in scans, a
 table also has medians and shares of lost robots; for scans a second one has the errors after the

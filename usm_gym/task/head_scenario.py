@@ -122,6 +122,8 @@ class HeadScenario(HeadEpisode):
             100 million physics steps at most.
         settle_time: From when on errors count, 0 to 3600 s.
         noise_seed: Seed of the sensors' errors and gaps, 0 to 2^64 - 1.
+        joint_stiffness: Joint controllers' proportional gain, 0 to 1e6 N m/rad.
+        joint_damping: Joint controllers' derivative gain, 0 to 1e6 N m s/rad.
         robot: The robot, or its name, as of `Scenario`.
     """
 
