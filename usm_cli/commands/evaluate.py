@@ -34,14 +34,14 @@ from usm_gym.task.modes import AnyScenario
 
 DESCRIPTION = """\
 Score policies. The score of an episode is the largest true position error after settling (5 s, for
-the head 10 s, in scans 20 s), in each axis, as in Table 1 of the paper. All policies meet the same scenarios and the
-same noise. Prints means over episodes, best first, and who wins; the wider the terminal, the more
-columns. A lost robot counts 0.5 m or more in both axes. Where robots are lost, and in scans, a
-table also has medians and shares of lost robots; for scans a second one has the errors after the
-first, third, fifth and last shift. Without --policies, a short list answers which controller to
-take. Under `basin` and `sea` it has all policies that are tuned for them, and beside them only the
-paper's `sta` and `pd`. A policy that fails to act is left out of the table and named with the
-reason; the exit status is then 1.
+the head 10 s, in scans 20 s), in each axis, as in Table 1 of the paper. All policies meet the same
+scenarios and the same noise. Prints means over episodes, best first, and who wins; the wider the
+terminal, the more columns. A lost robot counts 0.5 m or more in both axes. Where robots are lost,
+and in scans, a table also has medians and shares of lost robots; for scans a second one has the
+errors after the first, third, fifth and last shift. Without --policies, a short list answers which
+controller to take. Under `basin` and `sea` it has all policies that are tuned for them, and beside
+them only the paper's `sta` and `pd`. A policy that fails to act is left out of the table and named
+with the reason; the exit status is then 1.
 """
 EXAMPLES = f"""\
 {POLICIES}
