@@ -19,6 +19,7 @@ from usm_baselines.paper.reproduction import cases, run_cases
 
 from usm_gym.evaluation import evaluate
 from usm_gym.suites import suite
+from usm_gym.task.modes import of_head
 from usm_gym.task.scenario import STILL
 from usm_gym.world import world_of
 
@@ -50,11 +51,14 @@ def robots():
 def laws():
     """Every policy that acts on observations alone, and many robots in space."""
     step(gym.make_vec(SPACE, 2, "vector_entry_point"))
-    for name in ("operation", "operation-basin"):
-        nominal = suite(name)[0].nominal
+    for name in ("operation", "operation-basin", "head"):
+        scenario = suite(name)[0]
+        nominal = scenario.nominal
         observation = np.zeros((1, world_of(nominal.robot).layout.size), np.float32)
         for id in usm_baselines.ids():
             if registry.entry(id).privileged or registry.entry(id).tuned_for:
+                continue
+            if registry.entry(id).moves_joints != of_head(scenario.mode):
                 continue
             policy = usm_baselines.make(id, nominal)
             _, state = policy.predict(observation, None, np.ones(1, bool))
