@@ -37,6 +37,11 @@ HEAD_MODES: tuple[HeadMode, ...] = get_args(HeadMode)
 SPATIAL_HEAD_MODES: tuple[SpatialHeadMode, ...] = get_args(SpatialHeadMode)
 
 Angle = Annotated[Number, Field(ge=-100, le=100)]
+# What an episode at the station has of the head's.
+HELD = (
+    *("conditions", "water", "thruster_gains", "duration"),
+    *("settle_time", "noise_seed", "robot"),
+)
 # Straight, and where it is it stays.
 HERE, HERE_IN_SPACE = Path(speed=0.0, amplitude=0.0), SpatialPath(speed=0.0, sway=0.0, heave=0.0)
 
@@ -57,6 +62,11 @@ class HeadEpisode(BaseScenario):
     @abstractmethod
     def station(self) -> Any:
         """The same episode with still joints, in which the centre of mass holds its station."""
+
+    @property
+    def _held(self) -> dict[str, Any]:
+        """What the episode at the station has of this one, by name."""
+        return {name: getattr(self, name) for name in HELD}
 
     @property
     def body(self) -> Manipulator:
@@ -147,15 +157,9 @@ class HeadScenario(HeadEpisode):
         return Scenario(
             path=HERE,
             inspection=STILL,
-            conditions=self.conditions,
-            water=self.water,
-            thruster_gains=self.thruster_gains,
-            duration=self.duration,
-            settle_time=self.settle_time,
-            noise_seed=self.noise_seed,
             joint_stiffness=self.joint_stiffness,
             joint_damping=self.joint_damping,
-            robot=self.robot,
+            **self._held,
         )
 
 
@@ -196,11 +200,5 @@ class SpatialHeadScenario(HeadEpisode):
         return SpatialScenario(
             path=HERE_IN_SPACE,
             scan=NO_SCAN,
-            conditions=self.conditions,
-            water=self.water,
-            thruster_gains=self.thruster_gains,
-            duration=self.duration,
-            settle_time=self.settle_time,
-            noise_seed=self.noise_seed,
-            robot=self.robot,
+            **self._held,
         )
