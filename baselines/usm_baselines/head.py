@@ -30,7 +30,7 @@ from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
 
 # Gains that laws for the head share, each tuned for every law.
-HEAD_GAIN = Gain(10.0, "1/s", "rate of the head over its error", tuned=(1.0, 40.0), positive=True)
+HEAD_GAIN = Gain(10.0, "1/s", "rate of the head over its error", tuned=(0.3, 30.0), positive=True)
 LEAD = Gain(0.1, "s", "how far ahead the reference's velocity is taken", tuned=(0.01, 1.0))
 POSTURE_GAIN = Gain(
     0.3, "1/s", "rate at which the posture returns", tuned=(0.02, 3.0), positive=True

@@ -88,6 +88,12 @@ def test_every_eighth_scenario_reacts_later_than_the_policy_is_told() -> None:
             assert met == replace(told, conditions=expected)
 
 
+def test_for_the_head_every_second_scenario_does() -> None:
+    asked = problem(policy="rates-sta", mode="head", budget=Budget(20, 6))
+    pairs = zip(asked.scenarios(TUNING), asked.job({}, TUNING).scenarios, strict=True)
+    assert [told != met for told, met in pairs] == [False, True] * 3
+
+
 def first_generation(storage: str, asked: Problem) -> list[dict[str, float]]:
     tune(asked, storage)
     study = optuna.load_study(study_name=asked.study, storage=storage)
