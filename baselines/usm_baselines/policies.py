@@ -32,7 +32,7 @@ from usm_baselines.laws.whole_body import WholeBody
 from usm_baselines.laws.zero import Zero
 from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.registry import entry, ids, make, register
-from usm_baselines.space import space_of
+from usm_baselines.space import OF_BODY, space_of
 from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.task.conditions import PRESETS, SPATIAL_PRESETS
 from usm_gym.task.nominal import Nominal, nominal_under
@@ -214,26 +214,29 @@ HEAD_LAWS: dict[str, tuple[type[HeadLaw], str, tuple[str, ...]]] = {
     "whole": (
         WholeBody,
         "whole-body control by a quadratic program",
-        ("sta", "lqg-joints", "adaptive", "informed"),
+        ("lqg-joints", "adaptive", "informed"),
     ),
 }
 
 
 def steered(law: str, body: str, nominal: Nominal, **gains: Any) -> HeadLaw:
-    """A law for the head over one that holds the body with shipped gains.
+    """A law for the head over one that holds the body, by default with shipped gains.
 
     Args:
         law: One of `HEAD_LAWS`.
         body: The law for the body: a name without what it says of its gains.
         nominal: Nominal knowledge of a robot whose joints are the policy's.
-        gains: Gains of the law for the head.
+        gains: Gains of the law for the head, and with `OF_BODY` before their names those of the law
+            for the body.
     """
     station = station_of(nominal)
+    own = {name: gain for name, gain in gains.items() if not name.startswith(OF_BODY)}
+    held = {name.removeprefix(OF_BODY): gains[name] for name in gains if name not in own}
     # The oracle acts on the true heading, not on the one that looks ahead in what is observed.
     ahead = {"heading_lead": float(HEADING_LEAD)} if body == "oracle" else {}
-    holding: Any = make(shipped(body, station), station, **ahead)
+    holding: Any = make(shipped(body, station), station, **{**ahead, **held})
     assert isinstance(holding, ScriptedPolicy)
-    return HEAD_LAWS[law][0](nominal, holding, **gains)
+    return HEAD_LAWS[law][0](nominal, holding, **own)
 
 
 def shipped(law: str, nominal: Nominal) -> str:
@@ -263,7 +266,10 @@ for _name, (_kind, _summary, _bodies) in HEAD_LAWS.items():
             f"{_name}-{_body}",
             partial(steered, _name, _body),
             f"{_summary}, the body held by {_body}",
-            space=space_of(_kind.Gains),
+            space={
+                **space_of(_kind.Gains),
+                **{f"{OF_BODY}{name}": span for name, span in _law.space.items()},
+            },
             told=_law.told,
             on_request=_law.on_request,
             privileged=_law.privileged,

@@ -57,6 +57,9 @@ SPATIAL_RANGES = {
 }
 # Gains that have no effect in space, where attitude controllers look ahead anyway.
 PLANAR = ("heading_lead",)
+# What stands before the names of the gains of the law that holds the body, under a law for the
+# head.
+OF_BODY = "body_"
 
 
 class Gain(float):
@@ -123,8 +126,10 @@ def in_mode(space: Space, mode: str) -> Space:
     """The space in which the gains of a law are tuned in a mode, in the plane or in space."""
     if not in_space(mode):
         return space
-    spans = {name: SPATIAL_RANGES.get(name, span) for name, span in space.items()}
-    return {name: span for name, span in spans.items() if name not in PLANAR}
+    spans = {
+        name: SPATIAL_RANGES.get(name.removeprefix(OF_BODY), span) for name, span in space.items()
+    }
+    return {name: span for name, span in spans.items() if name.removeprefix(OF_BODY) not in PLANAR}
 
 
 def space_of(gains: type[Any], **others: Range) -> Space:

@@ -30,7 +30,7 @@ from usm_gym import suites
 from usm_gym.evaluation import Evaluation
 from usm_gym.support.seeding import EVALUATION, SUITE, TRAINING, TUNING, VALIDATION
 from usm_gym.task.conditions import FIELD
-from usm_gym.task.modes import in_space
+from usm_gym.task.modes import in_space, of_head
 from usm_gym.task.scenario import STILL
 from usm_gym.task.spatial_scenario import NO_SCAN
 
@@ -54,7 +54,8 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
     def brief(*arguments: Any) -> Any:
         scenario = sample(*arguments)
         still = {"scan": NO_SCAN} if in_space(scenario.mode) else {"inspection": STILL}
-        return replace(scenario, duration=1.0, settle_time=0.2, **still)
+        joints = {} if of_head(scenario.mode) else still
+        return replace(scenario, duration=1.0, settle_time=0.2, **joints)
 
     monkeypatch.setattr(tuning, "sample_of", brief)
 
