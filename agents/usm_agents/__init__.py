@@ -9,11 +9,11 @@ import gymnasium as gym
 from usm_agents.artifact.folder import register_shipped
 from usm_agents.residual.task import ResidualPolicy
 from usm_gym.registration import id_of
-from usm_gym.task.modes import ALL_MODES, of_head
+from usm_gym.task.modes import ALL_MODES
 
 __all__ = ["ResidualPolicy"]
 
-for _mode in (mode for mode in ALL_MODES if not of_head(mode)):
+for _mode in ALL_MODES:
     gym.register(
         id=id_of(_mode, "Residual"),
         entry_point="usm_agents.residual.env:make_residual_env",

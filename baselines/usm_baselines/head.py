@@ -119,6 +119,27 @@ def station_of(nominal: Nominal) -> Nominal:
     return dataclasses.replace(nominal, robot=nominal.robot.robot)
 
 
+class HeadPercept(NamedTuple):
+    """What a law for the head knows of a batch before it acts.
+
+    Attributes:
+        seen: Observations, (batch, numbers).
+        body: What the law for the body knows.
+        jacobians: How the head moves with the joints, see `HeadWorld.jacobians`.
+        offsets: By how much the centres of mass are further than measured, m, (batch, axes).
+    """
+
+    seen: NDArray[np.float32]
+    body: Percept
+    jacobians: Array
+    offsets: Array
+
+    @property
+    def state(self) -> Array:
+        """State of the law for the body, which is that of the law for the head."""
+        return self.body.state
+
+
 class HeadLaw:
     """A law for the head behind `predict`; subclasses give `Gains` and `act`.
 
@@ -155,28 +176,26 @@ class HeadLaw:
         self._robot = nominal.robot.robot
         self._home = posture_of(self._robot)
 
-    def act(
-        self, seen: NDArray[np.float32], known: Percept, thrust: Array, jacobians: Array
-    ) -> tuple[Array, Array]:
+    @property
+    def channels(self) -> int:
+        """What follows the path: the axes, in the plane also the direction."""
+        return self._model.channels
+
+    def act(self, known: HeadPercept, thrust: Array, correction: Array) -> tuple[Array, Array]:
         """Decide on thrusters and joints.
 
         Args:
-            seen: Observations, (batch, numbers).
-            known: What the law for the body knows.
-            thrust: What it commands of the thrusters over their limit, (batch, thrusters).
-            jacobians: How the head moves with the joints, see `HeadWorld.jacobians`.
+            known: What is known.
+            thrust: What the law for the body commands of the thrusters over their limit, (batch,
+                thrusters).
+            correction: What to add to the velocities wanted of the head, m/s and rad/s, (batch,
+                channels).
 
         Returns:
             Commands of the thrusters over their limit, (batch, thrusters), and rates of the joints,
             rad/s, (batch, joints).
         """
         raise NotImplementedError
-
-    def _offsets(self, seen: NDArray[np.float32], known: Percept) -> Array:
-        """By how much the centres of mass are further than measured, m, (batch, axes)."""
-        model = self._model
-        place = slice(model.position_error, model.position_error + model.axes)
-        return known.signals.y - seen[:, place] * model.scale[place]
 
     def predict(
         self,
@@ -203,20 +222,45 @@ class HeadLaw:
         Raises:
             ValueError: If the shape of the observation or the state is wrong.
         """
-        model = self._model
-        seen, single = as_batch(observation, model.scale.size)
-        station = seen[:, : self._world.station.layout.size].copy()
-        if model.heading_error >= 0:
-            look_ahead(station, model, self.gains.heading_lead)
+        seen, single = as_batch(observation, self._model.scale.size)
         if self.privileged:
             self.body.take_in(truth["snapshot"])  # type: ignore[attr-defined]
-        known = self.body.perceive(station, state, episode_start)
-        asked, new_state = self.body.decide(known)
-        jacobians = np.empty((len(seen), model.channels, model.joints))
-        self._world.jacobians(seen, jacobians)
-        thrust, rates = self.act(seen, known, asked.astype(np.float64), jacobians)
-        action = np.concatenate([thrust, rates / model.rate_limit], axis=1, dtype=np.float32)
+        action, new_state = self.decide(self.perceive(seen, state, episode_start))
         return (action[0] if single else action), new_state
+
+    def perceive(
+        self, observation: NDArray[np.float32], state: Array | None, start: ArrayLike | None
+    ) -> HeadPercept:
+        """The first half of `predict`, as of `ScriptedPolicy`."""
+        model = self._model
+        station = observation[:, : self._world.station.layout.size].copy()
+        if model.heading_error >= 0:
+            look_ahead(station, model, self.gains.heading_lead)
+        body = self.body.perceive(station, state, start)
+        jacobians = np.empty((len(observation), model.channels, model.joints))
+        self._world.jacobians(observation, jacobians)
+        place = slice(model.position_error, model.position_error + model.axes)
+        offsets = body.signals.y - observation[:, place] * model.scale[place]
+        return HeadPercept(observation, body, jacobians, offsets)
+
+    def decide(
+        self, known: HeadPercept, correction: Array | None = None
+    ) -> tuple[NDArray[np.float32], Array]:
+        """The second half: act on what is known, which stays as it is.
+
+        Args:
+            known: What `perceive` returned.
+            correction: As of `act`; None: 0.
+
+        Returns:
+            Commands, (batch, thrusters and joints), and the state for the next call.
+        """
+        asked, new_state = self.body.decide(known.body)
+        if correction is None:
+            correction = np.zeros((len(asked), self.channels))
+        thrust, rates = self.act(known, asked.astype(np.float64), correction)
+        rates /= self._model.rate_limit
+        return np.concatenate([thrust, rates], axis=1, dtype=np.float32), new_state
 
 
 def reactions(robot: AnyRobot, seen: NDArray[np.float32], layout: Layout) -> Array:

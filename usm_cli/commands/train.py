@@ -49,8 +49,9 @@ OPTIONS = (
         "action",
         str,
         "KIND",
-        "what the agent adds to: the base's force, wrench or thrusters, or "
-        "the estimates that it acts on (default: force)",
+        "what the agent adds to: the base's force, wrench or thrusters, the estimates that it acts "
+        "on, or the velocities that it wants of the head; or joints, which the agent then moves "
+        "alone (default: force)",
     ),
     ("frames", int, "K", "how many observations the agent sees at once (default: 1)"),
     ("seed", int, "S", "seed of all random numbers (default: 0)"),

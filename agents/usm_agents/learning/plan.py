@@ -42,7 +42,7 @@ class Plan:
         env: Id of a residual task.
         base: Base policy: an id, or an id with a file of gains.
         residual_scale: Largest residual, 1e-6 to 1000 N and N m.
-        action: What the action is: "force", "wrench", "thrusters" or "estimates".
+        action: What the action is: "force", "wrench", "thrusters", "estimates", "head" or "joints".
         omit: Entries of the observation that the agent is not shown.
         frames: How many observations it sees at once, 1 to 100.
         conditions: Conditions from which scenarios are sampled.

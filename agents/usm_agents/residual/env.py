@@ -15,11 +15,16 @@ from usm_baselines.laws.super_twisting import SuperTwisting
 from usm_agents.residual.observation import PLANAR_POSTURE, ResidualLayout, base_entries
 from usm_agents.residual.task import Array, Flags, Memory, Residual
 from usm_gym.envs.env import TrackingEnv, checked_action
+from usm_gym.envs.head import HeadEnv, HeadVectorEnv
+from usm_gym.envs.head3d import Head3DEnv, Head3DVectorEnv
 from usm_gym.envs.usm import USMEnv, USMVectorEnv
 from usm_gym.envs.usm3d import USM3DEnv, USM3DVectorEnv
 from usm_gym.envs.vector_env import TrackingVectorEnv
-from usm_gym.task.modes import AnyMode, in_space
+from usm_gym.task.head_scenario import HeadScenario, SpatialHeadScenario
+from usm_gym.task.modes import AnyMode, kind_of
 from usm_gym.task.nominal import Nominal
+from usm_gym.task.scenario import Scenario
+from usm_gym.task.spatial_scenario import SpatialScenario
 
 
 class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConstructorArgs):
@@ -37,7 +42,10 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
     same with moments (N m) about the angles that are controlled. "thrusters": forces of the
     thrusters (N). "estimates": what is added to error, rate and disturbance in each axis, in units
     of the largest corrections; the base then acts after the agent, which is shown neither its force
-    and moment nor its own last action.
+    and moment nor its own last action. Where the head follows a path, also "head": what is added to
+    the velocities wanted of it in each axis, and in the plane of its direction, in units of
+    0.03 m/s and 0.1 rad/s; and "joints": rates of the joints over their limit in place of the
+    base's. There "head" is the default.
 
     ## Observation
 
@@ -209,6 +217,15 @@ class ResidualVectorEnv(
         return self._seen.copy(), rewards, terminated, truncated, info
 
 
+# The plain environments, of one robot and of many, by the class of their scenarios.
+_PLAIN: dict[type, tuple[Any, Any]] = {
+    Scenario: (USMEnv, USMVectorEnv),
+    SpatialScenario: (USM3DEnv, USM3DVectorEnv),
+    HeadScenario: (HeadEnv, HeadVectorEnv),
+    SpatialHeadScenario: (Head3DEnv, Head3DVectorEnv),
+}
+
+
 def make_residual_env(
     mode: AnyMode,
     conditions: str | Mapping[str, Any] = "field",
@@ -217,8 +234,8 @@ def make_residual_env(
     **residual: Any,
 ) -> ResidualEnv:
     """Make the residual task of a mode; other arguments as of `Residual`."""
-    plain: Any = USM3DEnv if in_space(mode) else USMEnv
-    return ResidualEnv(plain(mode, conditions, robot, render_mode), **residual)
+    single, _ = _PLAIN[kind_of(mode)]
+    return ResidualEnv(single(mode, conditions, robot, render_mode), **residual)
 
 
 def make_residual_vector_env(
@@ -227,10 +244,10 @@ def make_residual_vector_env(
     **arguments: Any,
 ) -> ResidualVectorEnv:
     """Make the residual task of many robots; arguments as of `USMVectorEnv` and `Residual`."""
-    plain: Any = USM3DVectorEnv if in_space(mode) else USMVectorEnv
+    _, vector = _PLAIN[kind_of(mode)]
     names = list(inspect.signature(Residual).parameters)[1:]
     residual = {name: arguments.pop(name) for name in names if name in arguments}
-    return ResidualVectorEnv(plain(num_envs, mode, **arguments), **residual)
+    return ResidualVectorEnv(vector(num_envs, mode, **arguments), **residual)
 
 
 def _made_for(nominal: Nominal, current: Residual, arguments: Mapping[str, Any]) -> Residual:

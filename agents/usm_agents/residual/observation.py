@@ -50,6 +50,20 @@ SPATIAL_POSTURE = (
     Entry("bending_joints", 1, "1", 10.0, 100.0, "how many joints are asked to bend"),
 )
 
+# Of a robot whose head follows a path, behind its posture: of the axes, of the channels, which in
+# the plane are also the direction, and of the joints.
+HEAD_ERROR = Entry("head_error", 1, "m", SHORT, 10 * SHORT, "error of the head, by the navigator")
+HEAD_ENTRIES = (
+    Entry("head_reference_velocity", 1, "m/s", 0.1, 1.0, "velocity of the head's reference"),
+    Entry("head_reference_acceleration", 1, "m/s^2", 0.1, 1.0, "its acceleration"),
+)
+DIRECTION_ENTRIES = (
+    Entry("direction_error", 1, "rad", 0.01, 1.0, "direction of the head less its reference"),
+    Entry("direction_reference_rate", 1, "rad/s", 0.1, 1.0, "rate of that reference"),
+)
+JOINTS_VELOCITY = Entry("joints_velocity", 1, "m/s", 0.1, 1.0, "velocity of the head by the joints")
+JOINT_ANGLES = Entry("joint_angles", 1, "rad", 0.5, 10.0, "angles of the joints")
+
 
 def base_entries(shown: Iterable[str], axes: int) -> tuple[Entry, ...]:
     """The entries of the base's own numbers, named as its law does.
@@ -64,6 +78,14 @@ def base_entries(shown: Iterable[str], axes: int) -> tuple[Entry, ...]:
     for name in shown:
         require(name in BASE_ENTRIES, "shown", name, ", ".join(BASE_ENTRIES))
     return tuple(replace(BASE_ENTRIES[name], size=axes) for name in shown)
+
+
+def measured_by(length: float, entries: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    """The same entries, with lengths measured by one of our own, m."""
+    return tuple(
+        replace(entry, scale=length, bound=10 * length) if entry.unit == "m" else entry
+        for entry in entries
+    )
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from usm_baselines.estimation.estimator import LEADS, Estimate
 from usm_baselines.estimation.foresight import NAMES
+from usm_baselines.head import HeadLaw
 from usm_baselines.policy import ScriptedPolicy
 
-from usm_agents.residual.observation import ResidualLayout, base_entries
+from usm_agents.residual.observation import ResidualLayout, base_entries, measured_by
 from usm_agents.residual.posture import posture_of
 from usm_gym.kernels.compile import compiled, piece
+from usm_gym.manipulator import bare
 from usm_gym.policy import Policy
 from usm_gym.sensors import Layout
 from usm_gym.world import world_of
@@ -25,9 +27,10 @@ Flags = NDArray[np.bool_]
 # The entries that do not depend on base and robot, by name: their numbers in the table.
 _NAMES = [entry.name for entry in ResidualLayout((), 0, 0, 0, (), ()).complete]
 ENTRY: Any = namedtuple("ENTRY", _NAMES)(*range(len(_NAMES)))
-# What is not shown to an agent that corrects estimates: the base has not acted yet, and what the
-# agent has corrected before is in the command.
-NOT_TO_CORRECT = ("base_force", "base_moment", "last_action")
+# What is not shown to an agent after which the base acts. Where it corrects estimates, what it has
+# corrected before is in the command.
+NOT_YET = ("base_force", "base_moment")
+HIDDEN = {"estimates": (*NOT_YET, "last_action"), "head": NOT_YET, "joints": NOT_YET}
 FORESEEN = _NAMES.index(f"foreseen_error_{LEADS[0]}")  # the others follow
 
 
@@ -107,7 +110,7 @@ def fill_wrench(frame, starts, seen, plain, T, action):
     limit = physical(seen, plain, plain.thruster_limit)
     for row in range(T.shape[0]):
         total = 0.0
-        for j in range(action.size):
+        for j in range(min(action.size, T.shape[1])):
             total += T[row, j] * (action[j] * limit)
         frame[starts[ENTRY.base_force] + row] = total  # the moments follow the forces
 
@@ -155,27 +158,25 @@ class ResidualObserver:
         length: float,
         omit: tuple[str, ...],
         frames: int,
-        corrects: bool,
+        action: str,
     ) -> None:
         """Take the base, whose state or estimates are shown, and what a `ResidualLayout` needs."""
-        world, self._posture = world_of(robot), posture_of(robot)
+        world, self._posture = world_of(bare(robot)), posture_of(robot)
         axes = len(world.axes)
-        law = base if isinstance(base, ScriptedPolicy) else None
+        body = base.body if isinstance(base, HeadLaw) else base
+        law = body if isinstance(body, ScriptedPolicy) else None
         columns: dict[str, Any] = {}
-        if law is not None and corrects:
+        if law is not None and action == "estimates":
             first = law.predictor_columns.start + len(NAMES) * np.arange(axes)
             columns = {name: first + k for k, name in enumerate(NAMES)}
         elif law is not None:
             columns = {name: law.columns[name] for name in law.shown}
-        entries = tuple(
-            replace(entry, scale=length, bound=10 * length) if entry.unit == "m" else entry
-            for entry in base_entries(columns, axes)
-        )
-        if corrects:
-            omit = (*omit, *(name for name in NOT_TO_CORRECT if name not in omit))
+        entries = measured_by(length, base_entries(columns, axes))
+        posture = measured_by(length, self._posture.entries)
+        omit = (*omit, *(name for name in HIDDEN.get(action, ()) if name not in omit))
         moments = len(world.attitude) + len(world.watched)
         whole = ResidualLayout(
-            world.axes, moments, world.thrusters, actions, entries, self._posture.entries, length
+            world.axes, moments, world.thrusters, actions, entries, posture, length
         )
         self.layout = replace(whole, omit=omit, frames=frames)
         numbers, slices = np.arange(whole.size), whole.slices
@@ -194,6 +195,7 @@ class ResidualObserver:
 
     def update(
         self,
+        observation: NDArray[np.float32],
         known: Estimate,
         base_action: NDArray[np.float32],
         base_state: Any,
@@ -204,8 +206,9 @@ class ResidualObserver:
         """Make the observations of a batch.
 
         Args:
+            observation: Plain observations, (batch, numbers).
             known: What was measured, estimated and foreseen.
-            base_action: The base's commands over the limit, not clipped, (batch, thrusters).
+            base_action: The base's commands over the limits, not clipped, (batch, commands).
             base_state: The base's state after that.
             last_action: The agent's last action, (batch, actions).
             past: The earlier frames, which the last call returned, (batch, earlier).
@@ -217,7 +220,7 @@ class ResidualObserver:
         size = base_action.shape[0]
         seen = np.empty((size, self._table.scale.size), np.float32)
         kept, posture = np.empty((size, self.earlier)), np.empty((size, self._numbers))
-        self._posture.fill(known.signals.observation, posture)
+        self._posture.fill(observation, known.signals, posture)
         show(
             self._table,
             self._plain,

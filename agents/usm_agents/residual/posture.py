@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial, singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from usm_baselines.signals import Signals
 
-from usm_agents.residual.observation import PLANAR_POSTURE, SPATIAL_POSTURE
+from usm_agents.residual.observation import (
+    DIRECTION_ENTRIES,
+    HEAD_ENTRIES,
+    HEAD_ERROR,
+    JOINT_ANGLES,
+    JOINTS_VELOCITY,
+    PLANAR_POSTURE,
+    SPATIAL_POSTURE,
+)
+from usm_gym.head_world import HeadWorld
 from usm_gym.kernels.compile import compiled, piece
+from usm_gym.manipulator import Manipulator
 from usm_gym.robot import Robot
 from usm_gym.sensors import Entry, value
 from usm_gym.spatial_robot import SpatialRobot
@@ -38,11 +50,12 @@ class Posture(NamedTuple):
 
     Attributes:
         entries: What it gives, in order.
-        fill: `(observation, posture)`: fill in the physical values of a batch, (batch, numbers).
+        fill: `(observation, signals, posture)`: fill in the physical values of a batch, (batch,
+            numbers), from what is observed and what is known of the body.
     """
 
     entries: tuple[Entry, ...]
-    fill: Callable[[NDArray[np.float32], Array], None]
+    fill: Callable[[NDArray[np.float32], Signals, Array], None]
 
 
 @piece
@@ -77,7 +90,7 @@ def asked_to_bend(seen, plain, entry, joints):
 
 
 @compiled
-def planar_posture(plain, observation, posture):
+def planar_posture(plain, observation, signals, posture):
     """Fill in heading and joint motion of planar robots."""
     joints = plain.starts[ENTRY.joint_rates] - plain.starts[ENTRY.joint_angles]
     for b in range(observation.shape[0]):
@@ -92,7 +105,7 @@ def planar_posture(plain, observation, posture):
 
 
 @compiled
-def spatial_posture(plain, sides, observation, posture):
+def spatial_posture(plain, sides, observation, signals, posture):
     """Fill in attitude and joint motion of spatial robots.
 
     `sides` has how much a joint turns what is before it to the left and up, (joints, 2).
@@ -131,6 +144,51 @@ def _(robot: Robot) -> Posture:
 def _(robot: SpatialRobot) -> Posture:
     sides = np.array([(axis[2], -axis[1]) for axis in robot.joint_axes])
     return Posture(SPATIAL_POSTURE, partial(spatial_posture, _plain(robot), sides))
+
+
+@posture_of.register
+def _(robot: Manipulator) -> Posture:
+    world = world_of(robot)
+    assert isinstance(world, HeadWorld)
+    body, axes = posture_of(robot.robot), len(world.axes)
+    own = (
+        *(replace(entry, size=axes) for entry in (HEAD_ERROR, *HEAD_ENTRIES)),
+        *(DIRECTION_ENTRIES if world.attitude else ()),
+        replace(JOINTS_VELOCITY, size=axes),
+        replace(JOINT_ANGLES, size=robot.joints),
+    )
+    return Posture((*body.entries, *own), partial(head_posture, world, body))
+
+
+def head_posture(
+    world: HeadWorld,
+    body: Posture,
+    observation: NDArray[np.float32],
+    signals: Signals,
+    posture: Array,
+) -> None:
+    """Fill in the posture of bodies, and what is known of their heads."""
+    layout, axes = world.layout, len(world.axes)
+
+    def read(name: str) -> Array:
+        place = layout.slices[name]
+        return np.asarray(observation[:, place] * layout.scale[place])
+
+    first = sum(entry.size for entry in body.entries)
+    body.fill(observation, signals, posture[:, :first])
+    jacobians = np.empty(
+        (len(observation), axes + len(world.attitude), world.actions - world.thrusters)
+    )
+    world.jacobians(observation, jacobians)
+    known = [read("head_error") + signals.y - read("position_error")]
+    known += [read(f"head_reference_{name}") for name in ("velocity", "acceleration")]
+    if world.attitude:
+        known += [read("direction_error"), read("direction_reference_rate")]
+    known += [
+        np.einsum("bcj,bj->bc", jacobians[:, :axes], read("joint_rates")),
+        read("joint_angles"),
+    ]
+    np.concatenate(known, axis=1, out=posture[:, first:])
 
 
 def _plain(robot: Any) -> Plain:

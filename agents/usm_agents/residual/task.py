@@ -13,12 +13,14 @@ from usm_baselines.contender import contender
 from usm_baselines.estimation.estimator import Estimate, Estimator, foreseen
 from usm_baselines.estimation.foresight import NAMES
 from usm_baselines.estimation.prediction import believed
+from usm_baselines.head import HeadLaw, HeadPercept, station_of
 from usm_baselines.policy import Percept, ScriptedPolicy, corrected
 from usm_baselines.signals import model_of, softness_of
 
 from usm_agents.residual.observation import DEVIATIONS, SHORT
 from usm_agents.residual.observer import ResidualObserver
 from usm_gym.kernels.compile import compiled
+from usm_gym.manipulator import Manipulator
 from usm_gym.plant.thrusters import allocate
 from usm_gym.policy import Policy
 from usm_gym.support.validation import Count, Number, is_whole, require
@@ -28,12 +30,16 @@ from usm_gym.world import world_of
 Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
-ActionKind = Literal["force", "wrench", "thrusters", "estimates"]
+ActionKind = Literal["force", "wrench", "thrusters", "estimates", "head", "joints"]
+# With these the base acts after the agent.
+BEFORE_BASE = ("estimates", "head", "joints")
 # The limit of a thruster: less slows learning down, more buys error with chattering.
 RESIDUAL_SCALE = 20.0
 # The largest corrections of error, rate and disturbance over the standard deviation of a measured
 # position (1, 1/s, 1/s^2), which is taken to be no less than so many metres.
 LARGEST_CORRECTION, LEAST_DEVIATION = (10.0, 80.0, 400.0), 5e-5
+# The largest corrections of the velocities wanted of the head, m/s, and of its direction, rad/s.
+LARGEST_VELOCITY, LARGEST_TURN = 0.03, 0.1
 # N and N m: the limit of the strongest thruster that conditions allow.
 LEAST_RESIDUAL, LARGEST_RESIDUAL = 1e-6, 1000.0
 MOST_FRAMES = 100
@@ -48,13 +54,13 @@ class Memory(NamedTuple):
     Attributes:
         limit: Thruster limits, N, (batch,).
         allocation: Allocation matrices, (batch, forces and moments, thrusters).
-        base_action: The base's commands over the limit, not clipped, (batch, thrusters); none
-            where the agent corrects its estimates, since it acts only then.
+        base_action: The base's commands over the limits, not clipped, (batch, commands); none
+            where the base acts after the agent.
         base_state: State of the base.
         estimator_state: State of the estimator beside it, (batch, numbers).
         frames: Earlier frames of the observation, physical values, (batch, numbers).
         action: The agent's last action, (batch, actions).
-        known: What a base whose estimates are corrected knows before it acts, else None.
+        known: What a base that acts after the agent knows before, else None.
     """
 
     limit: NDArray[np.float64]
@@ -64,18 +70,18 @@ class Memory(NamedTuple):
     estimator_state: NDArray[np.float64]
     frames: NDArray[np.float64]
     action: Array
-    known: Percept | None
+    known: Percept | HeadPercept | None
 
 
 @compiled
 def correct_all(base_action, allocation, limit, residual, wrench, softness, command):  # type: ignore[no-untyped-def]
-    """Fill in the commands over the limit, (batch, thrusters): the base's and a residual's.
+    """Fill in the commands over the limits, (batch, commands): the base's and a residual's.
 
     Residuals are wrenches, forces in N before moments in N m, which the thrusters make with least
     norm, or forces of the thrusters, N. A wrench of forces alone has no moment.
     """
     rows = allocation.shape[1]
-    forces, work = np.empty(base_action.shape[1]), np.empty((2 * rows + 1, rows))
+    forces, work = np.empty(allocation.shape[2]), np.empty((2 * rows + 1, rows))
     wanted = np.zeros(rows)
     for b in range(len(command)):
         if wrench:
@@ -85,6 +91,8 @@ def correct_all(base_action, allocation, limit, residual, wrench, softness, comm
             forces[:] = residual[b]
         for j in range(forces.size):
             command[b, j] = base_action[b, j] + forces[j] / limit[b]
+        for j in range(forces.size, command.shape[1]):
+            command[b, j] = base_action[b, j]
 
 
 class Residual:
@@ -100,9 +108,9 @@ class Residual:
     def __init__(
         self,
         nominal: Nominal,
-        base: str | Policy = "sta",
+        base: str | Policy | None = None,
         residual_scale: float = RESIDUAL_SCALE,
-        action: ActionKind = "force",
+        action: ActionKind | None = None,
         omit: Sequence[str] = (),
         frames: int = 1,
         position_noise: float | None = None,
@@ -111,12 +119,15 @@ class Residual:
 
         Args:
             nominal: What is known of the robot.
-            base: The base policy: a name as `--policies` takes it, or the policy itself.
+            base: The base policy: a name as `--policies` takes it, or the policy itself; by default
+                "sta", and "rates-sta" where it has to move the joints, too.
             residual_scale: Largest residual force per axis or per thruster, N, and largest
                 residual moment, N m; 1e-6 to 1000.
             action: What the agent's answer is added to: the "force" on the centre of mass, the
-                "wrench" or the forces of the "thrusters" that the base commands, or the "estimates"
-                that it acts on.
+                "wrench" or the forces of the "thrusters" that the base commands, the "estimates"
+                that it acts on, or the velocities that it wants of the "head"; or what stands in
+                place of the rates of the "joints" that it commands. By default that of the
+                "head" where the base moves joints, else the "force".
             omit: Entries of the observation that the agent is not shown, by name.
             frames: How many observations the agent sees at once, the latest last, 1 to 100.
             position_noise: Standard deviation of a measured position by which errors are scaled for
@@ -125,21 +136,24 @@ class Residual:
         Raises:
             ValueError: If the base is unknown or an argument not allowed.
         """
+        world, steered = world_of(nominal.robot), isinstance(nominal.robot, Manipulator)
+        if base is None:
+            base = "rates-sta" if steered else "sta"
+        if action is None:
+            action = "head" if steered else "force"
         _check(residual_scale, action, frames)
         self.nominal = nominal
         self.base = base = _made(base, nominal)
         self._scale, self._action = float(residual_scale), action
-        world = world_of(nominal.robot)
-        plain = world.layout
-        self._softness = softness_of(model_of(nominal))
+        # What is estimated is the body, whoever moves the joints.
+        station = station_of(nominal) if steered else nominal
+        held = world_of(station.robot)
+        plain = held.layout
+        self._body_size = plain.size
+        self._softness = softness_of(model_of(station))
         self._limit = plain.slices["thruster_limit"].start
         self._limit_scale = plain.scale[self._limit]
-        self._corrected: ScriptedPolicy | None = None
-        if action == "estimates":
-            estimating = isinstance(base, ScriptedPolicy) and base.predictor is not None
-            require(estimating, "base", base, "a law that estimates by the plant, to be corrected")
-            assert isinstance(base, ScriptedPolicy)
-            self._corrected = base
+        self._deciding = _deciding(base, action)
         # A base whose estimates another agent corrects: this one is shown what that base believes.
         self._believing: Residual | None = None
         if isinstance(base, ResidualPolicy) and base.residual.corrects:
@@ -147,12 +161,14 @@ class Residual:
         axes = len(world.axes)
         numbers = {
             "force": axes,
-            "wrench": axes + len(world.attitude),
+            "wrench": axes + len(held.attitude),
             "thrusters": world.thrusters,
             "estimates": len(NAMES) * axes,
+            "head": axes + len(world.attitude),
+            "joints": world.actions - world.thrusters,
         }
         self.actions = numbers[action]
-        self._estimator = Estimator(nominal)
+        self._estimator = Estimator(station)
         noise = nominal.position_noise if position_noise is None else position_noise
         length = max(SHORT, DEVIATIONS * noise)
         self._observer = ResidualObserver(
@@ -162,15 +178,17 @@ class Residual:
             length,
             tuple(omit),
             frames,
-            action == "estimates",
+            action,
         )
         self.layout = self._observer.layout
         self.correction = max(noise, LEAST_DEVIATION) * np.array(LARGEST_CORRECTION)
+        turns = self.actions - axes if action == "head" else 0
+        self._velocities = np.array([LARGEST_VELOCITY] * axes + [LARGEST_TURN] * turns)
 
     @property
     def corrects(self) -> bool:
         """Whether the agent corrects the estimates that the base acts on."""
-        return self._corrected is not None
+        return self._action == "estimates"
 
     @property
     def action_space(self) -> gym.Space[Array]:
@@ -199,9 +217,9 @@ class Residual:
         else:
             base_state, filtered = memory.base_state, memory.estimator_state
             action, past = memory.action, memory.frames
-        known: Percept | None = None
-        if self._corrected is not None:
-            known = self._corrected.perceive(observation, base_state, start)
+        known: Percept | HeadPercept | None = None
+        if self._deciding is not None:
+            known = self._deciding.perceive(observation, base_state, start)
             base_action, base_state = np.empty((size, 0), np.float32), known.state
         else:
             base_action, base_state = self.base.predict(observation, base_state, start, True)
@@ -209,8 +227,11 @@ class Residual:
         if self._believing is not None:
             estimate, filtered = self._believing.estimate(base_state[0]), np.empty((size, 0))
         else:
-            estimate, filtered = self._estimator.update(observation, filtered, start)
-        seen, frames = self._observer.update(estimate, base_action, base_state, action, past, start)
+            body = np.ascontiguousarray(observation[:, : self._body_size])
+            estimate, filtered = self._estimator.update(body, filtered, start)
+        seen, frames = self._observer.update(
+            observation, estimate, base_action, base_state, action, past, start
+        )
         limit = observation[:, self._limit] * self._limit_scale
         allocation = estimate.signals.allocation
         return seen, Memory(
@@ -225,12 +246,11 @@ class Residual:
             action: The agent's actions, (batch, actions); values beyond [-1, 1] saturate.
 
         Returns:
-            Thruster commands over the limit, (batch, thrusters), and what to keep.
+            Commands over the limits, (batch, commands), and what to keep.
         """
         action = np.minimum(np.maximum(action, -1.0), 1.0)
-        if self._corrected is not None:
-            assert memory.known is not None
-            command, base_state = self._corrected.decide(memory.known, self._correction(action))
+        if self._deciding is not None:
+            command, base_state = self._decide(memory.known, action)
             return command, memory._replace(action=action, base_state=base_state)
         command = np.empty(memory.base_action.shape, np.float32)
         residual = self._scale * action.astype(np.float64)
@@ -252,13 +272,24 @@ class Residual:
         Args:
             memory: What `command` returned, the action being "estimates".
         """
-        law, known = self._corrected, memory.known
-        assert law is not None
+        law, known = self._deciding, memory.known
+        assert isinstance(law, ScriptedPolicy)
         assert law.predictor is not None
-        assert known is not None
+        assert isinstance(known, Percept)
         signals = corrected(known.signals, self._correction(memory.action))
         state = believed(signals, known.state[:, law.predictor_columns])
         return foreseen(law.predictor, signals, state)
+
+    def _decide(self, known: Any, action: Array) -> tuple[Array, Any]:
+        """Let a base that acts after the agent act: its commands, and its state."""
+        law: Any = self._deciding
+        if self._action == "estimates":
+            return law.decide(known, self._correction(action))  # type: ignore[no-any-return]
+        if self._action == "head":
+            return law.decide(known, self._velocities * action)  # type: ignore[no-any-return]
+        command, base_state = law.decide(known)
+        command[:, -self.actions :] = action
+        return command, base_state
 
     def _correction(self, action: Array) -> NDArray[np.float64]:
         return self.correction * action.reshape(len(action), -1, len(NAMES))
@@ -331,6 +362,20 @@ def _check(residual_scale: float, action: str, frames: int) -> None:
         f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
     )
     require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
+
+
+def _deciding(base: Policy, action: str) -> ScriptedPolicy | HeadLaw | None:
+    """The base, if it acts after the agent."""
+    if action not in BEFORE_BASE:
+        return None
+    if action == "estimates":
+        estimating = isinstance(base, ScriptedPolicy) and base.predictor is not None
+        require(estimating, "base", base, "a law that estimates by the plant, to be corrected")
+        assert isinstance(base, ScriptedPolicy)
+        return base
+    require(isinstance(base, HeadLaw), "base", base, "a law for the head, which moves the joints")
+    assert isinstance(base, HeadLaw)
+    return base
 
 
 def _made(base: str | Policy, nominal: Nominal) -> Policy:

@@ -17,10 +17,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from usm_baselines.head import DAMPING, HEAD_GAIN, HEADING_LEAD, LEAD, POSTURE_GAIN, HeadLaw
-from usm_baselines.policy import Percept
+from usm_baselines.head import (
+    DAMPING,
+    HEAD_GAIN,
+    HEADING_LEAD,
+    LEAD,
+    POSTURE_GAIN,
+    HeadLaw,
+    HeadPercept,
+)
 from usm_baselines.signals import Array
 from usm_gym.kernels.compile import compiled
 from usm_gym.plant.thrusters import allocate
@@ -37,10 +43,11 @@ class ResolvedRatesGains(NamedTuple):
 
 
 @compiled
-def wanted_velocities(seen, model, offset, gain, lead, wanted):
+def wanted_velocities(seen, model, offset, correction, gain, lead, wanted):
     """Fill in the velocities wanted of the channels of the head, m/s and rad/s, (channels,).
 
-    `offset` is by how much the centre of mass is further than measured, m, (axes,).
+    `offset` is by how much the centre of mass is further than measured, m, (axes,), `correction`
+    what is added to the velocities.
     """
     for axis in range(model.axes):
         k = model.head_error + axis
@@ -49,22 +56,22 @@ def wanted_velocities(seen, model, offset, gain, lead, wanted):
         velocity = seen[k] * model.scale[k]
         k = model.reference_acceleration + axis
         wanted[axis] = velocity + lead * (seen[k] * model.scale[k]) - gain * error
+        wanted[axis] += correction[axis]
     if model.channels > model.axes:
         k = model.direction_error
         error = seen[k] * model.scale[k]
         k = model.direction_rate
-        wanted[model.axes] = seen[k] * model.scale[k] - gain * error
+        wanted[model.axes] = seen[k] * model.scale[k] - gain * error + correction[model.axes]
 
 
 @compiled
-def resolve(seen, model, offsets, jacobians, home, gains, rates):
+def resolve(known, model, correction, home, gains, rates):
     """Fill in the rates of a batch, rad/s, (batch, joints), within their limit.
 
     Args:
-        seen: Observations, (batch, numbers).
+        known: What is known.
         model: Nominal knowledge.
-        offsets: By how much the centres of mass are further than measured, m, (batch, axes).
-        jacobians: How the heads move with the joints, (batch, channels, joints).
+        correction: What is added to the velocities wanted of the heads, (batch, channels).
         home: Posture to return to, rad, (joints,).
         gains: The gains.
         rates: Where to write.
@@ -73,15 +80,17 @@ def resolve(seen, model, offsets, jacobians, home, gains, rates):
     wanted, work = np.empty(channels), np.empty((2 * channels + 1, channels))
     # Damping is what as many more joints would do that move the head alone.
     T, found = np.zeros((channels, joints + channels)), np.empty(joints + channels)
-    for b in range(seen.shape[0]):
-        wanted_velocities(seen[b], model, offsets[b], gains.head_gain, gains.lead, wanted)
+    for b in range(known.seen.shape[0]):
+        seen, offset, jacobian = known.seen[b], known.offsets[b], known.jacobians[b]
+        gain, lead = gains.head_gain, gains.lead
+        wanted_velocities(seen, model, offset, correction[b], gain, lead, wanted)
         for j in range(joints):
             k = model.joint_angles + j
-            rates[b, j] = -gains.posture_gain * (seen[b, k] * model.scale[k] - home[j])
+            rates[b, j] = -gains.posture_gain * (seen[k] * model.scale[k] - home[j])
         for c in range(channels):
             for j in range(joints):
-                T[c, j] = jacobians[b, c, j]
-                wanted[c] -= jacobians[b, c, j] * rates[b, j]
+                T[c, j] = jacobian[c, j]
+                wanted[c] -= jacobian[c, j] * rates[b, j]
             T[c, joints + c] = gains.damping
         allocate(T, wanted, channels, 0.0, work, found)
         largest = model.rate_limit
@@ -97,10 +106,8 @@ class ResolvedRates(HeadLaw):
 
     Gains: type[Any] = ResolvedRatesGains
 
-    def act(
-        self, seen: NDArray[np.float32], known: Percept, thrust: Array, jacobians: Array
-    ) -> tuple[Array, Array]:
+    def act(self, known: HeadPercept, thrust: Array, correction: Array) -> tuple[Array, Array]:
         """Leave the thrusters to the law for the body, and move the joints."""
-        rates, offsets = np.empty((len(seen), self._model.joints)), self._offsets(seen, known)
-        resolve(seen, self._model, offsets, jacobians, self._home, self.gains, rates)
+        rates = np.empty((len(thrust), self._model.joints))
+        resolve(known, self._model, correction, self._home, self.gains, rates)
         return thrust, rates

@@ -15,7 +15,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from usm_baselines.head import (
     DAMPING,
@@ -24,10 +23,10 @@ from usm_baselines.head import (
     LEAD,
     POSTURE_GAIN,
     HeadLaw,
+    HeadPercept,
     reactions,
 )
 from usm_baselines.laws.resolved_rates import wanted_velocities
-from usm_baselines.policy import Percept
 from usm_baselines.signals import Array
 from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled, piece
@@ -60,14 +59,13 @@ def least(J, wanted, damping, T, work, found):
 
 
 @compiled
-def prioritise(seen, model, offsets, jacobians, turns, home, gains, rates):
+def prioritise(known, model, correction, turns, home, gains, rates):
     """Fill in the rates of a batch, rad/s, (batch, joints), within their limit.
 
     Args:
-        seen: Observations, (batch, numbers).
+        known: What is known.
         model: Nominal knowledge.
-        offsets: By how much the centres of mass are further than measured, m, (batch, axes).
-        jacobians: How the heads move with the joints, (batch, channels, joints).
+        correction: What is added to the velocities wanted of the heads, (batch, channels).
         turns: How the bodies turn with the joints, (batch, angles, joints); no angle in the plane.
         home: Posture to return to, rad, (joints,).
         gains: The gains.
@@ -81,16 +79,18 @@ def prioritise(seen, model, offsets, jacobians, turns, home, gains, rates):
     work, wanted = np.empty((2 * most + 1, most)), np.empty(model.channels)
     second, asked, left = np.empty((seconds, joints)), np.empty(seconds), np.empty(axes)
     back = np.empty(joints)
-    for b in range(seen.shape[0]):
-        wanted_velocities(seen[b], model, offsets[b], gains.head_gain, gains.lead, wanted)
-        first = jacobians[b, :axes]
+    for b in range(known.seen.shape[0]):
+        seen, offset, jacobian = known.seen[b], known.offsets[b], known.jacobians[b]
+        gain, lead = gains.head_gain, gains.lead
+        wanted_velocities(seen, model, offset, correction[b], gain, lead, wanted)
+        first = jacobian[:axes]
         least(first, wanted[:axes], gains.damping, T, work, found)
         for j in range(joints):
             rates[b, j] = found[j]
             k = model.joint_angles + j
-            back[j] = -gains.posture_gain * (seen[b, k] * model.scale[k] - home[j])
+            back[j] = -gains.posture_gain * (seen[k] * model.scale[k] - home[j])
         for s in range(seconds):
-            row = jacobians[b, axes + s] if s < directions else turns[b, s - directions]
+            row = jacobian[axes + s] if s < directions else turns[b, s - directions]
             asked[s] = wanted[axes + s] if s < directions else 0.0
             for j in range(joints):
                 asked[s] -= row[j] * rates[b, j]
@@ -127,13 +127,11 @@ class TaskPriority(HeadLaw):
 
     Gains: type[Any] = TaskPriorityGains
 
-    def act(
-        self, seen: NDArray[np.float32], known: Percept, thrust: Array, jacobians: Array
-    ) -> tuple[Array, Array]:
+    def act(self, known: HeadPercept, thrust: Array, correction: Array) -> tuple[Array, Array]:
         """Leave the thrusters to the law for the body, and move the joints."""
-        model, turns = self._model, np.empty((len(seen), 0, self._model.joints))
+        model, turns = self._model, np.empty((len(thrust), 0, self._model.joints))
         if model.channels == model.axes:
-            turns = reactions(self._robot, seen, self._world.layout)
-        rates, offsets = np.empty((len(seen), model.joints)), self._offsets(seen, known)
-        prioritise(seen, model, offsets, jacobians, turns, self._home, self.gains, rates)
+            turns = reactions(self._robot, known.seen, self._world.layout)
+        rates = np.empty((len(thrust), model.joints))
+        prioritise(known, model, correction, turns, self._home, self.gains, rates)
         return thrust, rates

@@ -23,12 +23,19 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from usm_baselines.head import HEAD_GAIN, HEADING_LEAD, LEAD, POSTURE_GAIN, HeadLaw, reactions
+from usm_baselines.head import (
+    HEAD_GAIN,
+    HEADING_LEAD,
+    LEAD,
+    POSTURE_GAIN,
+    HeadLaw,
+    HeadPercept,
+    reactions,
+)
 from usm_baselines.laws.resolved_rates import wanted_velocities
 from usm_baselines.planning import solve
-from usm_baselines.policy import Percept, ScriptedPolicy
+from usm_baselines.policy import ScriptedPolicy
 from usm_baselines.signals import Array
 from usm_baselines.space import Gain
 from usm_gym.kernels.compile import compiled
@@ -118,34 +125,35 @@ def bounded(H, g, low, high, x):
 
 
 @compiled
-def whole_body(seen, model, offsets, jacobians, turns, pushes, wrenches, home, limits, gains, x):
+def whole_body(known, model, correction, turns, wrenches, home, limits, gains, x):
     """Fill in forces, N, and rates, rad/s, of a batch, (batch, thrusters + joints).
 
     Args:
-        seen: Observations, (batch, numbers).
+        known: What is known.
         model: Nominal knowledge.
-        offsets: By how much the centres of mass are further than measured, m, (batch, axes).
-        jacobians: How the heads move with the joints, (batch, channels, joints).
+        correction: What is added to the velocities wanted of the heads, (batch, channels).
         turns: How the bodies turn with the joints, (batch, angles, joints).
-        pushes: Forces along the axes and moments of unit forces, (batch, rows, thrusters).
         wrenches: What the law for the body asks for, (batch, rows).
         home: Posture to return to, rad, (joints,).
         limits: Limits of the thrusters, N, (batch,).
         gains: The gains.
         x: Where to write.
     """
-    channels, joints, thrusters = model.channels, model.joints, pushes.shape[2]
+    channels, joints, pushes = model.channels, model.joints, known.body.signals.allocation
+    thrusters = pushes.shape[2]
     n, rows, angles = thrusters + joints, pushes.shape[1], turns.shape[1]
     H, g, wanted = np.empty((n, n)), np.empty(n), np.empty(channels)
     low, high = np.empty(n), np.empty(n)
     A = np.zeros((channels + rows + angles, n))
     t = np.zeros(channels + rows + angles)
-    for b in range(seen.shape[0]):
-        wanted_velocities(seen[b], model, offsets[b], gains.head_gain, gains.lead, wanted)
+    for b in range(known.seen.shape[0]):
+        seen, offset, jacobian = known.seen[b], known.offsets[b], known.jacobians[b]
+        gain, lead = gains.head_gain, gains.lead
+        wanted_velocities(seen, model, offset, correction[b], gain, lead, wanted)
         for c in range(channels):
             t[c] = wanted[c]
             for j in range(joints):
-                A[c, thrusters + j] = jacobians[b, c, j]
+                A[c, thrusters + j] = jacobian[c, j]
             if c < model.axes:
                 # Beyond what the law for the body does, which is not the head's business.
                 for k in range(thrusters):
@@ -172,11 +180,11 @@ def whole_body(seen, model, offsets, jacobians, turns, pushes, wrenches, home, l
         square = gains.posture_weight * gains.posture_weight
         for j in range(joints):
             i, k = thrusters + j, model.joint_angles + j
-            back = -gains.posture_gain * (seen[b, k] * model.scale[k] - home[j])
+            back = -gains.posture_gain * (seen[k] * model.scale[k] - home[j])
             H[i, i] += square
             g[i] += square * back
             # No faster towards the limit of the angle than to be there a while later.
-            angle = seen[b, k] * model.scale[k]
+            angle = seen[k] * model.scale[k]
             high[i] = saturated((model.angle_limit - angle) / BRAKING, model.rate_limit)
             low[i] = -saturated((model.angle_limit + angle) / BRAKING, model.rate_limit)
         bounded(H, g, low, high, x[b])
@@ -192,28 +200,13 @@ class WholeBody(HeadLaw):
         super().__init__(nominal, body, **gains)
         self._limit = self._world.layout.slices["thruster_limit"].start
 
-    def act(
-        self, seen: NDArray[np.float32], known: Percept, thrust: Array, jacobians: Array
-    ) -> tuple[Array, Array]:
+    def act(self, known: HeadPercept, thrust: Array, correction: Array) -> tuple[Array, Array]:
         """Allot forces and rates together."""
-        model, pushes = self._model, known.signals.allocation
+        model, seen, thrusters = self._model, known.seen, thrust.shape[1]
         limits = seen[:, self._limit] * model.scale[self._limit]
+        pushes = known.body.signals.allocation
         wrenches = np.einsum("brk,bk->br", pushes, thrust * limits[:, np.newaxis])
         turns = reactions(self._robot, seen, self._world.layout)
-        found = np.zeros((len(seen), thrust.shape[1] + model.joints))
-        offsets = self._offsets(seen, known)
-        whole_body(
-            seen,
-            model,
-            offsets,
-            jacobians,
-            turns,
-            pushes,
-            wrenches,
-            self._home,
-            limits,
-            self.gains,
-            found,
-        )
-        forces, rates = found[:, : thrust.shape[1]], found[:, thrust.shape[1] :]
-        return forces / limits[:, np.newaxis], rates
+        found, home = np.zeros((len(seen), thrusters + model.joints)), self._home
+        whole_body(known, model, correction, turns, wrenches, home, limits, self.gains, found)
+        return found[:, :thrusters] / limits[:, np.newaxis], found[:, thrusters:]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.logger import configure
 from torch import nn
 from torch.nn.functional import huber_loss
-from usm_baselines.policy import ScriptedPolicy
+from usm_baselines.policy import Percept, ScriptedPolicy
 
 from usm_agents.artifact.network import Network, Recurrence
 from usm_agents.learning.divergence import check_weights
@@ -181,7 +181,7 @@ class EstimatorLearner:
         first_episode = np.ones(robots, bool)
         for k in range(periods):
             known, truth = envs.memory.known, setup.truth()
-            assert known is not None  # the task is to correct estimates
+            assert isinstance(known, Percept)  # the task is to correct estimates
             observation = known.signals.observation
             rate = truth["velocity"] - scale * seen[:, velocity]
             if k > 0:
