@@ -21,6 +21,10 @@ WIDE = (
     "results/study/study.md",
     "results/space/leaderboard.md",
     "results/space/study/study.md",
+    "results/head/leaderboard.md",
+    "results/head/study/study.md",
+    "results/head3d/leaderboard.md",
+    "results/head3d/study/study.md",
 )
 WHOLE = "---\nhide: [navigation, toc]\n---\n\n"
 

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from usm_baselines.benchmark.leaderboard import PLANE, SPACE, LeaderboardResult
+from usm_baselines.benchmark.leaderboard import BOARDS, LeaderboardResult
 from usm_baselines.benchmark.leaderboard_page import verdict
 
 import usm_gym
@@ -15,9 +15,8 @@ from usm_cli.speed import SpeedResult
 from usm_gym.support.text import figures
 
 FOLDER = Path(__file__).parents[2] / "results" / usm_gym.__version__
-# Folders of the boards, and where their figures are in the site.
-FOLDERS = {PLANE: FOLDER, SPACE: FOLDER / "space"}
-VERDICTS = {PLANE: "<!-- verdict -->", SPACE: "<!-- verdict in space -->"}
+# Where pages have the verdict of a board.
+VERDICTS = {board: f"<!-- verdict: {board.main} -->" for board in BOARDS}
 SPEED, FINDINGS = "<!-- bench.json -->", "<!-- bench.json: findings -->"
 # Whose episodes the report replays; others would make it large.
 REPLAYED = "estimator-lqg-joints,adaptive,sta"
@@ -36,9 +35,9 @@ def filled(text):
     """A page with what its marks stand for."""
     for board, mark in VERDICTS.items():
         if mark in text:
-            result, figure = leaderboard(board), FOLDERS[board].relative_to(FOLDER) / "verdict.svg"
-            known = decision_times(FOLDERS[board], space=board is SPACE)
-            shown = verdict(result, f"results/{figure.as_posix()}", known) if result else ""
+            result, figure = leaderboard(board), Path("results", board.folder, "verdict.svg")
+            known = decision_times(FOLDER / board.folder, board)
+            shown = verdict(result, figure.as_posix(), known) if result else ""
             text = text.replace(mark, shown)
     if SPEED in text:
         path = FOLDER / "bench.json"
@@ -50,7 +49,7 @@ def filled(text):
 @cache
 def leaderboard(board):
     """A leaderboard of this version; None if there is none yet."""
-    path = FOLDERS[board] / "leaderboard.json"
+    path = FOLDER / board.folder / "leaderboard.json"
     return LeaderboardResult.read(path) if path.exists() else None
 
 

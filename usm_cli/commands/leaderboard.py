@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.markdown import Markdown
-from usm_baselines.benchmark.leaderboard import PLANE, SPACE, front, leaderboard, places
+from usm_baselines.benchmark.leaderboard import BOARDS, PLANE, Board, front, leaderboard, places
 from usm_baselines.benchmark.leaderboard_page import csv_text, markdown, table, with_table
 
 from usm_cli.options import output_folder
@@ -28,19 +28,22 @@ from usm_gym.suites import NAMES
 from usm_gym.support.files import check_writable, holding, read_text, write_text
 from usm_gym.support.results import Provenance
 from usm_gym.support.validation import require
+from usm_gym.task.modes import of_head
 
 DESCRIPTION = """\
-Score every policy on the frozen suites that it is meant for, and on the operation suite with the
-joints still: policies that are tuned for `basin` or `sea` on the suites of these conditions only,
-and there no others but the paper's `sta` and `pd` and those that are no competitors. Policies that
-are named meet every suite. Writes leaderboard.json, leaderboard.csv, leaderboard.md and figures
-(extra `render`) into a folder. After an interruption, run it again to continue: the folder
-`cache` there keeps the scores of a policy on a suite until something changes on which they depend.
+Score every policy on the frozen suites that it is meant for, and laws for the body on the operation
+suite with the joints still: policies that are tuned for `basin` or `sea` on the suites of these
+conditions only, and there no others but the paper's `sta` and `pd` and those that are no
+competitors. Policies that are named meet every suite. Writes leaderboard.json, leaderboard.csv,
+leaderboard.md and figures (extra `render`) into a folder. After an interruption, run it again to
+continue: the folder `cache` there keeps the scores of a policy on a suite until something changes
+on which they depend.
 """
 EXAMPLES = f"""\
 {POLICIES}
 examples:
   usm leaderboard --workers 2                          into results/VERSION
+  usm leaderboard --head --space                       the head of the robot in space
   usm leaderboard --insert README.md                   also the verdict, between its marks
   usm leaderboard --policies sta,my_module:MyController --output mine
   usm leaderboard --policies lqg-tuned,lqg-basin,lqg-sea --output tiers
@@ -60,7 +63,12 @@ def add_to(subparsers: Any) -> None:
     add_scoring(parser)
     add = parser.add_argument
     add("--space", action="store_true", help="the suites in space instead of those in the plane")
-    add("--output", metavar="DIR", help="folder (default: results/VERSION, or its folder space)")
+    add("--head", action="store_true", help="the suites in which the head follows a path")
+    add(
+        "--output",
+        metavar="DIR",
+        help="folder (default: results/VERSION, or its folder space, head or head3d)",
+    )
     add(
         "--insert",
         metavar="FILE",
@@ -74,15 +82,14 @@ def run(arguments: argparse.Namespace) -> None:
     page = None if arguments.insert is None else read_text(arguments.insert)
     if page is not None:
         check_writable(arguments.insert)
-    board, usual = PLANE, f"results/{version('usm-gym')}"
-    if arguments.space:
-        board, usual = SPACE, f"{usual}/space"
-    folder = output_folder(arguments.output or usual)
+    board = board_of(arguments.head, arguments.space)
+    usual = Path("results", version("usm-gym"), board.folder)
+    folder = output_folder(arguments.output or str(usual))
     from usm_baselines.benchmark.leaderboard_figures import draw_all
 
     named = arguments.policies is not None
     contenders = named_contenders(arguments.policies) if named else None
-    fronts = {} if named or arguments.space else front()
+    fronts = front() if board is PLANE and not named else {}
     suites = board.suites()
     chosen = places(contenders, fronts, suites, arguments.time_limit)
     with holding(folder):
@@ -97,28 +104,29 @@ def run(arguments: argparse.Namespace) -> None:
         write_text(folder / "leaderboard.md", markdown(result))
         if page is not None:
             figure = Path(os.path.relpath(folder / "verdict.svg", Path(arguments.insert).parent))
-            write_text(
-                arguments.insert,
-                with_table(
-                    page, result, figure.as_posix(), decision_times(folder, arguments.space)
-                ),
-            )
+            known = decision_times(folder, board)
+            write_text(arguments.insert, with_table(page, result, figure.as_posix(), known))
         draw_all(result, folder)
     output_console().print(Markdown(table(result.main)))
     leave_if_refused({id: why for rows in result.refused.values() for id, why in rows.items()})
 
 
-def decision_times(folder: Path, space: bool = False) -> dict[str, float]:
+def board_of(head: bool, space: bool) -> Board:
+    """The board of body or head, in the plane or in space."""
+    return BOARDS[2 * head + space]
+
+
+def decision_times(folder: Path, board: Board = PLANE) -> dict[str, float]:
     """How long policies take for a decision, us, if `usm bench` has left that beside the tables.
 
     Args:
-        folder: Folder of the leaderboard; that of the leaderboard in space is inside the one where
-            the file of `usm bench` is.
-        space: Whether for the robot in space.
+        folder: Folder of the leaderboard.
+        board: Which one it is; that of the plane has its folder where the file of `usm bench` is,
+            all others have theirs inside it. Decisions for the head are not timed.
     """
-    path = (folder.parent if space else folder) / "bench.json"
-    if not path.exists():
+    path = (folder.parent if board.folder else folder) / "bench.json"
+    if of_head(board.main) or not path.exists():
         return {}
     speed = SpeedResult.read(path)
-    decisions = speed.spatial_decisions if space else speed.decisions
+    decisions = speed.decisions if board is PLANE else speed.spatial_decisions
     return {id: figure.median for id, figure in decisions.items()}

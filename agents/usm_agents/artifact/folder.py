@@ -27,6 +27,7 @@ from usm_baselines.tiers import TIERS, tier_of
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
 from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
+from usm_gym.manipulator import Manipulator, bare
 from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json
 from usm_gym.support.validation import (
@@ -38,7 +39,7 @@ from usm_gym.support.validation import (
     validated,
 )
 from usm_gym.task.conditions import conditions_of
-from usm_gym.task.modes import AnyMode, in_space
+from usm_gym.task.modes import AnyMode, in_space, of_head
 from usm_gym.task.nominal import Nominal
 
 DESCRIPTION, WEIGHTS = "agent.json", "policy.safetensors"
@@ -197,7 +198,10 @@ def make_agent(nominal: Nominal, folder: str) -> ResidualPolicy:
     """
     agent, network = read_agent(Path(folder))
     kind = "a robot in space" if in_space(agent.mode) else "the planar robot"
-    same = in_space(agent.mode) == isinstance(nominal.robot, SpatialRobot)
+    kind += " whose joints the policy moves" if of_head(agent.mode) else ""
+    spatial = isinstance(bare(nominal.robot), SpatialRobot)
+    steered = isinstance(nominal.robot, Manipulator)
+    same = (in_space(agent.mode), of_head(agent.mode)) == (spatial, steered)
     require(same, "robot", nominal.robot, f"{kind}, with which {folder} was trained")
     weights = weights_of(agent.base)
     require(agent.base_weights == weights, f"base_weights of {folder}", agent.base_weights, weights)
@@ -242,7 +246,7 @@ def told_with(base: str) -> str:
 def made_for(conditions: dict[str, Any], mode: AnyMode) -> str:
     """The tier that conditions of a training in a mode are, as `Contender.tuned_for` has it."""
     tier = tier_of(conditions_of(conditions), mode)
-    return tier if tier in TIERS else ""
+    return tier if tier in TIERS or of_head(mode) else ""
 
 
 def agent_contender(folder: str) -> Contender:
@@ -281,4 +285,5 @@ def register_shipped() -> None:
             told=told,
             tuned_for=tuned_for,
             family=Family.LEARNED,
+            moves_joints=of_head(agent["mode"]),
         )

@@ -26,19 +26,21 @@ from usm_gym.support.results import Interval, Part, Provenance, Result
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import IN_SPACE
 from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of
-from usm_gym.task.modes import AnyScenario, of_head
+from usm_gym.task.modes import AnyScenario, kind_of, of_head
 from usm_gym.task.nominal import shared_nominal
 
 
 @dataclass(frozen=True)
 class Board:
-    """The suites of the body whose scores stand in one leaderboard: in the plane, or in space.
+    """The suites whose scores stand in one leaderboard: of body or head, in the plane or in space.
 
     Attributes:
         main: The suite that counts; the others are named after it, but for those of other modes.
+        folder: Where in the results of a version it is.
     """
 
     main: str
+    folder: str = ""
 
     @property
     def still(self) -> str:
@@ -48,21 +50,25 @@ class Board:
     @property
     def tiers(self) -> dict[str, str]:
         """By tier, the suite on which policies for it and for the others are compared."""
-        return {"field": self.main} | {tier: f"{self.main}-{tier}" for tier in ("basin", "sea")}
+        named = {tier: f"{self.main}-{tier}" for tier in ("basin", "sea")}
+        return {"field": self.main} | {tier: name for tier, name in named.items() if name in NAMES}
 
     def suites(self) -> dict[str, list[AnyScenario]]:
-        """The frozen suites, and the control."""
-        here = [name for name in NAMES if (IN_SPACE in name) == (IN_SPACE in self.main)]
-        known = {name: suite(name) for name in here}
-        chosen = {name: them for name, them in known.items() if not of_head(them[0].mode)}
-        chosen[self.still] = [
-            replace(scenario, conditions=replace(scenario.conditions, motion=False))
-            for scenario in chosen[self.main]
-        ]
+        """The frozen suites, and of the body the control."""
+        known = {name: suite(name) for name in NAMES}
+        kind = kind_of(known[self.main][0].mode)
+        chosen = {name: them for name, them in known.items() if kind_of(them[0].mode) is kind}
+        if not of_head(known[self.main][0].mode):
+            chosen[self.still] = [
+                replace(scenario, conditions=replace(scenario.conditions, motion=False))
+                for scenario in chosen[self.main]
+            ]
         return chosen
 
 
-PLANE, SPACE = Board("operation"), Board("operation3d")
+PLANE, SPACE = Board("operation"), Board("operation3d", "space")
+HEAD, SPACE_HEAD = Board("head", "head"), Board("head3d", "head3d")
+BOARDS = (PLANE, SPACE, HEAD, SPACE_HEAD)
 
 
 @validated
@@ -165,7 +171,7 @@ class LeaderboardResult(Result):
 
     def __post_init__(self) -> None:
         """Refuse a leaderboard without a main suite, and rows that cannot be compared."""
-        mains = [board.main for board in (PLANE, SPACE)]
+        mains = [board.main for board in BOARDS]
         counts = [main for main in mains if main in self.suites]
         require(counts, "suites", list(self.suites), f"{' or '.join(mains)} among them")
         for name, rows in self.suites.items():
@@ -178,7 +184,7 @@ class LeaderboardResult(Result):
     @property
     def board(self) -> Board:
         """Whose suites these are."""
-        return PLANE if PLANE.main in self.suites else SPACE
+        return next(board for board in BOARDS if board.main in self.suites)
 
     @property
     def main(self) -> Mapping[str, Standing]:

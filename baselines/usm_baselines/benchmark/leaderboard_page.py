@@ -101,15 +101,15 @@ def verdict_table(rows: Mapping[str, Standing], decisions: Mapping[str, float]) 
         decisions: How long policies take for a decision, us, as far as it is known.
     """
     axes, places = axes_in(rows.values()), rank_labels(rows)
-    lines = [
-        f"| rank | policy | why | error {' + '.join(axes)}, mm | variation, N/s | decision, µs |"
-    ]
-    lines.append("|---:|---|---|---:|---:|---:|")
+    columns = ["rank", "policy", "why", f"error {' + '.join(axes)}, mm", "variation, N/s"]
+    columns += ["decision, µs"] if decisions else []
+    lines = [f"| {' | '.join(columns)} |", "|---:|---|---|" + "---:|" * (len(columns) - 3)]
     for id, reasons in choices(rows).items():
         mean, margin = rows[id].combined
         cells = [places[id], f"`{id}`", ", ".join(reasons), give_or_take(1e3 * mean, 1e3 * margin)]
         cells.append(figures(rows[id].metrics["thrust_variation"].mean))
-        cells.append(figures(decisions[id]) if id in decisions else "")
+        if decisions:
+            cells.append(figures(decisions[id]) if id in decisions else "")
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

@@ -217,12 +217,17 @@ def shifts_in(rows: Iterable[Scores]) -> tuple[str, ...]:
 INFORMED = "informed"
 
 
+def is_informed(id: str) -> bool:
+    """Whether a policy is that law, or one for the head over it, with any gains."""
+    return INFORMED in id.split("-")
+
+
 def over_informed(rows: Mapping[str, Scores]) -> dict[str, str]:
     """Mean errors of each row over those of the law that is told what is constant, by name.
 
     That is how far knowledge could take it. Empty if no such law is among the rows.
     """
-    told = [row for id, row in rows.items() if id.partition("-")[0] == INFORMED]
+    told = [row for id, row in rows.items() if is_informed(id)]
     if not told:
         return {}
     best = min(told, key=lambda row: row.objective)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from usm_baselines.benchmark.results import INFORMED, CompetitorScores
+from usm_baselines.benchmark.results import CompetitorScores, is_informed
 from usm_baselines.families import Family
 from usm_baselines.registry import base_of, entry, ids
 from usm_baselines.tiers import PAPER
@@ -51,7 +51,7 @@ def choices(rows: Mapping[str, CompetitorScores]) -> dict[str, list[str]]:
                 found.setdefault(id, []).append(reason)
                 break
     for id, row in rows.items():
-        if not row.competitor and id.partition("-")[0] == INFORMED:
+        if not row.competitor and is_informed(id):
             found[id] = [TOLD_ALL]
     return {id: found[id] for id in rows if id in found}
 
@@ -80,5 +80,7 @@ def is_learned(id: str) -> bool:
 
 
 def is_papers(id: str) -> bool:
-    """Whether a policy is the paper's law, with any gains, lag and estimates."""
-    return base_of(id) == LAW
+    """Whether a policy is the paper's law, or one over it, with any gains, lag and estimates."""
+    law = base_of(id)
+    steers = law in ids() and entry(law).moves_joints
+    return law == LAW or (steers and law.endswith(f"-{LAW}"))

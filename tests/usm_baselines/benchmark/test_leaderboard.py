@@ -26,20 +26,20 @@ from usm_gym.planar_world import PlanarWorld
 from usm_gym.robot import Robot
 from usm_gym.statistics import compare
 from usm_gym.suites import NAMES, suite
-from usm_gym.task.modes import of_head
 from usm_gym.task.nominal import shared_nominal
 
 ROOT = Path(__file__).parents[3]
 SUITES = {board.PLANE.main: short(3), "other": short(2, seed=1)}
 
 
-def test_every_suite_of_the_body_is_on_one_board() -> None:
-    plane, space = board.PLANE.suites(), board.SPACE.suites()
-    body = {name for name in NAMES if not of_head(suite(name)[0].mode)}
-    assert {*plane, *space} == {*body, board.PLANE.still, board.SPACE.still}
-    assert not {*plane} & {*space}
+def test_every_suite_is_on_one_board() -> None:
+    suites = [which.suites() for which in board.BOARDS]
+    listed = [name for chosen in suites for name in chosen]
+    assert sorted(listed) == sorted([*NAMES, board.PLANE.still, board.SPACE.still])
+    plane, space, head, _ = suites
     assert plane["table1"] == suite("table1")
     assert space["torpedo3d"] == suite("torpedo3d")
+    assert list(head) == ["head", "head-basin"]
 
 
 @pytest.mark.parametrize("which", [board.PLANE, board.SPACE])
@@ -107,11 +107,11 @@ def test_a_law_is_one_whatever_its_gains() -> None:
     assert registry.base_of("sta-navigator-basin") == registry.base_of("sta-lag-tuned") == "sta"
 
 
-@pytest.mark.parametrize("which", [board.PLANE, board.SPACE])
+@pytest.mark.parametrize("which", board.BOARDS)
 def test_a_result_knows_its_board_and_its_tiers(which: board.Board) -> None:
-    result = made_up({"pd": ""}, (which.main, f"{which.main}-sea"))
+    result = made_up({"pd": ""}, (which.main, f"{which.main}-basin"))
     assert result.board == which
-    assert list(result.tiers) == ["field", "sea"]
+    assert list(result.tiers) == ["field", "basin"]
     assert result.tiers["field"] == result.main
 
 
