@@ -24,7 +24,7 @@ from usm_gym.evaluation import rollout
 from usm_gym.policy import Policy, is_privileged
 from usm_gym.suites import unseen
 from usm_gym.task.conditions import IN_SPACE
-from usm_gym.task.modes import AnyScenario
+from usm_gym.task.modes import AnyScenario, of_head
 from usm_gym.task.nominal import Nominal, shared_nominal
 from usm_gym.world import world_of
 
@@ -156,10 +156,10 @@ def dissected(home: Home, chosen: Sequence[StudyTraining]) -> dict[str, Dissecti
     """What the agents that add to the thrust in `field` do to it, as their seed 0; see `dissect`.
 
     In the other tiers the oracle, behind lag, dead-bands and gains, does not tell what was needed;
-    and nothing can be taken from a base that asks for no force.
+    and nothing can be taken from a base that asks for no force. Agents of the head add to no force.
     """
     made: dict[str, Dissection] = {}
-    if home.tier.removesuffix(IN_SPACE) != "field":
+    if home.tier.removesuffix(IN_SPACE) != "field" or of_head(home.mode):
         return made
     for training in chosen:
         plan = training.plan

@@ -17,7 +17,7 @@ from usm_gym.task.conditions import (
     Conditions,
     preset_of,
 )
-from usm_gym.task.modes import AnyMode, presets_of
+from usm_gym.task.modes import AnyMode, of_head, presets_of
 
 FORESEEN = ("foreseen_error_2", "foreseen_error_5", "foreseen_error_10", "foreseen_rate")
 # What an agent cannot tell from what is measured now.
@@ -62,6 +62,14 @@ _ESTIMATOR_IN_SPACE = replace(
     interval=250_000,
 )
 _TORPEDO_IN_SPACE = "usm_agents:USM-Torpedo3DResidual-v0"
+_HEAD = Plan(
+    env="usm_agents:USM-HeadResidual-v0",
+    base="rates-lqg-joints-tuned",
+    action="head",
+)
+_HEAD_IN_SPACE = replace(
+    _HEAD, env="usm_agents:USM-Head3DResidual-v0", base="rates-lqg-joints-eely", conditions=SPACE
+)
 
 # The agents that are shipped, each as its seed 0. One whose base is another agent comes after it.
 AGENTS: dict[str, Plan] = {
@@ -84,6 +92,12 @@ AGENTS: dict[str, Plan] = {
     "residual-torpedo-eely": replace(_RESIDUAL_IN_SPACE, env=_TORPEDO_IN_SPACE),
     "estimator-lqg-joints-eely": _ESTIMATOR_IN_SPACE,
     "estimator-torpedo-eely": replace(_ESTIMATOR_IN_SPACE, env=_TORPEDO_IN_SPACE),
+    "residual-head": _HEAD,
+    "residual-head-sta": replace(_HEAD, base="rates-sta-tuned"),
+    "rl-joints": replace(_HEAD, action="joints"),
+    "residual-head-eely": _HEAD_IN_SPACE,
+    "residual-head-sta-eely": replace(_HEAD_IN_SPACE, base="rates-sta-eely"),
+    "rl-joints-eely": replace(_HEAD_IN_SPACE, action="joints"),
 }
 
 
@@ -123,6 +137,8 @@ HEADLINES = (
     "estimator-lqg-joints-basin",
     "residual-sta-navigator-basin",
     "residual-eely",
+    "residual-head",
+    "residual-head-eely",
 )
 FEWER = {
     "estimator-lqg-joints-sea": 3,
@@ -132,11 +148,17 @@ FEWER = {
     # No headline rests on these.
     "residual-torpedo-eely": 3,
     "estimator-torpedo-eely": 3,
+    "rl-joints": 3,
+    "rl-joints-eely": 3,
 }
 SEEDS = dict.fromkeys(PLANS, 5) | dict.fromkeys(HEADLINES, 10) | FEWER
 
-# Policies beside which the agents of a tier stand, as `--policies` takes them; besides them, the
-# agents' bases.
+# Policies beside which the agents of a tier stand, as `--policies` takes them, and those of a home
+# that has others; besides them, the agents' bases.
+_HEAD_LAWS = (
+    *("rates-sta", "rates-pd", "rates-lqg-joints"),
+    *("priority-lqg-joints", "whole-lqg-joints"),
+)
 RIVALS: dict[str, tuple[str, ...]] = {
     "field": (
         "sta",
@@ -165,6 +187,8 @@ RIVALS: dict[str, tuple[str, ...]] = {
         "adaptive-eely",
         "informed-eely",
     ),
+    "head-field": (*(f"{law}-tuned" for law in _HEAD_LAWS), "rates-oracle"),
+    "head3d-field": (*(f"{law}-eely" for law in _HEAD_LAWS), "rates-oracle"),
 }
 
 
@@ -211,7 +235,10 @@ class Home:
     @property
     def sets(self) -> dict[str, Conditions]:
         """The conditions of all sets of scenarios there, by name; those of the tier first."""
-        return {self.tier: self.conditions, **ELSEWHERE[self.tier]}
+        others = ELSEWHERE[self.tier]
+        if of_head(self.mode):  # whose joints are never still
+            others = {name: others[name] for name in others if name != "still"}
+        return {self.tier: self.conditions, **others}
 
     @property
     def conditions(self) -> Conditions:
@@ -234,7 +261,8 @@ def home_of(name: str) -> Home:
 def rivals_of(home: Home, names: Iterable[str]) -> dict[str, str]:
     """The rivals of agents at a home: as `--policies` takes them, by the name that tables show."""
     bases = [PLANS[name].base for name in names if home_of(name) == home]
-    return {rival_name(rival): rival for rival in dict.fromkeys([*RIVALS[home.tier], *bases])}
+    rivals = RIVALS.get(home.name, RIVALS[home.tier])
+    return {rival_name(rival): rival for rival in dict.fromkeys([*rivals, *bases])}
 
 
 def rival_name(rival: str) -> str:
