@@ -66,6 +66,7 @@ _HEAD = Plan(
     env="usm_agents:USM-HeadResidual-v0",
     base="rates-lqg-joints-tuned",
     action="head",
+    steps=500_000,
 )
 _HEAD_IN_SPACE = replace(
     _HEAD, env="usm_agents:USM-Head3DResidual-v0", base="rates-lqg-joints-eely", conditions=SPACE
