@@ -19,6 +19,7 @@ from usm_baselines.benchmark.results import (
     lost,
     medians_in,
     over_informed,
+    prices,
     rms_in,
     shifts_in,
 )
@@ -27,14 +28,12 @@ from usm_cli.terminal import empty_table
 from usm_gym.statistics import FEWEST_EPISODES, ratio_interval
 from usm_gym.support.text import counted, degrees, figures, give_or_take, listed, mm
 from usm_gym.task.loss import LOST_ERROR
-from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
 LEGEND = """\
 error: largest position error after settling, {axes} added up, mean ± half of its 95 % interval; \
 N/s: how much the thrust varies; lost: robots, each of which counts {loss} mm or more. \
-Order: the objective, which is the error plus {attitude} mm per degree of heading error and \
-{variation} mm per N/s. Rows share a rank (=) until the data tell one from the first \
-of them."""
+Order: the objective, which is the error plus {prices}. \
+Rows share a rank (=) until the data tell one from the first of them."""
 UNRANKED = "Rows without a rank are no competitors: they are told more than a vehicle knows."
 # What a lost robot counts at least, mm.
 LOSS = round(1e3 * LOST_ERROR)
@@ -113,8 +112,7 @@ def legend(rows: Mapping[str, Standing]) -> str:
     said = LEGEND.format(
         axes=listed(axes_in(rows.values())),
         loss=LOSS,
-        attitude=ATTITUDE_WEIGHT,
-        variation=VARIATION_WEIGHT,
+        prices=prices(attitude_in(rows.values())),
     )
     parts = [said] if all(row.competitor for row in rows.values()) else [said, UNRANKED]
     notes = sorted({row.note for row in rows.values() if row.note})

@@ -26,8 +26,8 @@ from usm_gym.task.metrics import VARIATION_WEIGHT
 
 DESCRIPTION = """\
 Search for the gains of a policy with the smallest objective: the mean over scenarios of the largest
-errors, summed over the axes, in mm, plus 0.05 mm per degree of the largest heading error and a
-weight times the thrust variation. In every eighth scenario, for the head in every second, the
+errors, summed over the axes, in mm, plus 0.05 mm per degree of the largest error of the attitude
+and a weight times the thrust variation. In every eighth scenario, for the head in every second, the
 vehicle reacts later than the policy is told. Scenarios are sampled for tuning only; tuning never
 uses a frozen suite. After an interruption, run the same command again to continue. The result is
 the same for any number of workers. Needs the extra `tune`.

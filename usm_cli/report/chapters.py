@@ -34,7 +34,7 @@ from usm_cli.report.tables import (
     score_table,
     verdict_table,
 )
-from usm_cli.report.words import CONDITIONS, PAPERS, SCORES, in_words, motion, verdict
+from usm_cli.report.words import CONDITIONS, PAPERS, about_scores, in_words, motion, verdict
 from usm_gym.manipulator import Manipulator
 from usm_gym.robots import AnyRobot
 from usm_gym.suites import unseen
@@ -99,6 +99,7 @@ def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> 
     """Several policies on one list of scenarios."""
     name, scenarios = result.suite or "sampled", result.scenarios
     rows = by_objective(result.results)
+    table = {name: score_table(rows, result.refused)}
     return Chapter(
         title=f"Evaluation: {name}",
         lead=f"{len(rows)} policies on {counted(len(scenarios), 'episode')}.",
@@ -106,7 +107,7 @@ def evaluation(result: EvaluationResult, choice: Choice, progress: Progress) -> 
             *(advice({name: rows}) if result.axes else []),
             *front(rows, result.axes),
             replay(scenarios, rows, result.axes, choice, progress),
-            Tables("Scores", SCORES, "suite", {name: score_table(rows, result.refused)}),
+            Tables("Scores", about_scores(rows), "suite", table),
             *conditions("suite", name, scenarios),
             provenance(result.provenance),
         ],
@@ -133,7 +134,7 @@ def leaderboard(result: LeaderboardResult, choice: Choice, progress: Progress) -
             *advice(result.tiers),
             plots.front(result.tiers, result.front),
             replay(scenarios[main], rows, result.axes, choice, progress),
-            Tables("Scores", SCORES, "suite", tables),
+            Tables("Scores", about_scores(rows), "suite", tables),
             Tables("Conditions", CONDITIONS, "suites", {"all": conditions_table(known)}),
             provenance(result.provenance),
         ],
@@ -232,7 +233,7 @@ def study(result: StudyResult, choice: Choice, progress: Progress) -> Chapter:
             replay(episodes[top], rows, first.axes, choice, progress),
             Tables(
                 "Scores",
-                f"{SCORES} All seeds together; intervals resample seeds and scenarios.",
+                f"{about_scores(rows)} All seeds together; intervals resample seeds and scenarios.",
                 "where",
                 {title: score_table(scores, {}) for title, scores in tables},
             ),

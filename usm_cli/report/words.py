@@ -6,27 +6,19 @@ import math
 from collections.abc import Iterable, Mapping
 from statistics import median
 
-from usm_baselines.benchmark.results import CompetitorScores, Scores
+from usm_baselines.benchmark.results import CompetitorScores, Scores, attitude_in, prices
 from usm_baselines.registry import base_of, entry, ids
 
 from usm_cli.report.tables import competes
 from usm_cli.score_table import combined_error, conclusion
 from usm_gym.support.text import counted, figures, listed
 from usm_gym.task.head_scenario import HeadEpisode
-from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 from usm_gym.task.modes import AnyScenario
 from usm_gym.task.scenario import Scenario
 from usm_gym.task.spatial_scenario import SpatialScenario
 
 # The paper's controller, with which the best one is compared.
 PAPERS = "sta"
-SCORES = (
-    "Largest position error after settling, mean over the episodes; rms is the root mean square, "
-    "variation how much the thrust changes in a second. The objective orders the rows: the error "
-    f"plus {ATTITUDE_WEIGHT} mm per degree of heading error and {VARIATION_WEIGHT} mm per N/s. "
-    "Rows share a rank (=) until the data tell one from the first of them. A lost robot counts "
-    "0.5 m or more."
-)
 CONDITIONS = (
     "What the simulation does to a controller. Every episode has another current and other "
     "coefficients, which no controller knows; all meet the same episodes and the same noise."
@@ -40,6 +32,16 @@ FORMS = {
     "sea": "the same law with gains for sea",
     "eely": "the same law with gains for the robot in space",
 }
+
+
+def about_scores(rows: Mapping[str, Scores]) -> str:
+    """Say what a table of scores has."""
+    return (
+        "Largest position error after settling, mean over the episodes; rms is the root mean "
+        "square, variation how much the thrust changes in a second. The objective orders the rows: "
+        f"the error plus {prices(attitude_in(rows.values()))}. Rows share a rank (=) until the "
+        "data tell one from the first of them. A lost robot counts 0.5 m or more."
+    )
 
 
 def motion(rows: Mapping[str, Scores]) -> str:

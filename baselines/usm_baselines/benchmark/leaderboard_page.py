@@ -23,6 +23,7 @@ from usm_baselines.benchmark.results import (
     lost,
     medians_in,
     over_informed,
+    prices,
     rms_in,
     shifts_in,
 )
@@ -31,7 +32,6 @@ from usm_baselines.registry import POSITION_ONLY
 from usm_gym.statistics import FEWEST_EPISODES
 from usm_gym.support.text import degrees, figures, give_or_take, listed, mm
 from usm_gym.support.validation import require
-from usm_gym.task.metrics import ATTITUDE_WEIGHT, VARIATION_WEIGHT
 
 # The tier of which the verdict speaks first.
 TANK = "basin"
@@ -46,10 +46,9 @@ MARK = "†"
 NO_COLUMN = ("saturation_share",)
 LEGEND = """\
 Largest position error after settling, mm: mean over the episodes, with half of its 95 % interval;
-worst episode. Largest {angle} error, °. Variation is how much the command of a thruster changes in
-a second. Rows are ordered by the objective by which gains and agents are chosen: the means in
-{axes} added up, plus {attitude} mm per degree of {angle} error and {variation} mm per N/s of thrust
-variation. Going down, rows share a rank (=) until the data tell one from the first of them. "Beats
+worst episode.{turned} Variation is how much the command of a thruster changes in a second. Rows are
+ordered by the objective by which gains and agents are chosen: the means in {axes} added up, plus
+{prices}. Going down, rows share a rank (=) until the data tell one from the first of them. "Beats
 the next" says whether the interval of the paired difference to the next row leaves out 0, and with
 what probability an episode goes better. "Over informed" is a row's means over those of the law that
 is told what is constant in an episode: the distance that knowledge could close.
@@ -181,9 +180,8 @@ def markdown(result: LeaderboardResult) -> str:
     angles = attitude_in(result.main.values())
     legend = LEGEND.format(
         axes=listed(result.axes),
-        angle=listed(angles) if angles else "attitude",
-        attitude=ATTITUDE_WEIGHT,
-        variation=VARIATION_WEIGHT,
+        turned=f" Largest {listed(angles)} error, °." if angles else "",
+        prices=prices(angles),
     )
     axes = " / ".join(result.axes)
     parts = [f"# Leaderboard of usm-gym {result.version}\n", legend]

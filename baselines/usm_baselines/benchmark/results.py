@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, asdict
 from typing import Annotated, Any, ClassVar, Self
 
@@ -14,10 +14,18 @@ from usm_baselines.contender import Contender
 from usm_gym.evaluation import SHIFT_METRICS
 from usm_gym.statistics import Comparison, mean_interval
 from usm_gym.support.results import Interval, Part, Provenance, Result
-from usm_gym.support.text import figures
+from usm_gym.support.text import figures, listed
 from usm_gym.support.validation import Count, Number, Switch, require, validated
 from usm_gym.task.conditions import Conditions
-from usm_gym.task.metrics import ANGLE_ERROR, MAX_ERROR, attitude_of, axes_of, objective
+from usm_gym.task.metrics import (
+    ANGLE_ERROR,
+    ATTITUDE_WEIGHT,
+    MAX_ERROR,
+    VARIATION_WEIGHT,
+    attitude_of,
+    axes_of,
+    objective,
+)
 from usm_gym.task.stored_scenario import StoredScenarios
 
 Array = NDArray[np.float64]
@@ -248,6 +256,12 @@ def lost(row: Scores, shared: bool) -> str:
 def attitude_in(rows: Iterable[Scores]) -> tuple[str, ...]:
     """The angles that rows have in common; none if there is no row."""
     return next((tuple(row.attitude) for row in rows), ())
+
+
+def prices(angles: Sequence[str]) -> str:
+    """What the objective adds to the errors, in words; `angles` are those that count."""
+    turned = [f"{ATTITUDE_WEIGHT} mm per degree of {listed(angles)} error"] if angles else []
+    return " and ".join([*turned, f"{VARIATION_WEIGHT} mm per N/s of thrust variation"])
 
 
 def rms_in(rows: Iterable[Scores]) -> tuple[str, ...]:
