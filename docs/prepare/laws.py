@@ -44,7 +44,7 @@ def filled(text):
 def law(ids, everyone):
     """Gains of a law; of one for the body also an episode and the scores."""
     if entry(ids[0]).moves_joints:
-        return gains(ids)
+        return "\n\n".join(filter(None, [gains(ids, ids[:1]), chosen(ids)]))
     shown = in_the_plane(shipped(ids))
     others = [id for id in everyone if id not in shown]
     names = ", ".join(f"<code>{id}</code>" for id in shown)
@@ -54,7 +54,7 @@ def law(ids, everyone):
     )
     figure = f"<figure>{figures.errors(shown, others)}<figcaption>{caption}</figcaption></figure>"
     tables = [scores(board, shipped(ids)) for board in SHOWN]
-    return "\n\n".join([gains(ids), figure, *filter(None, tables)])
+    return "\n\n".join([gains(ids, shipped(ids)), figure, *filter(None, tables)])
 
 
 def shipped(ids):
@@ -71,9 +71,8 @@ def in_the_plane(ids):
     return [id for id in ids if not entry(id).tuned_for.endswith(IN_SPACE)]
 
 
-def gains(ids):
-    """The declared gains of a law, and their values in the policies."""
-    names = shipped(ids)
+def gains(ids, names):
+    """The declared gains of a law, and their values in policies."""
     values = {id: made(id)._asdict() for id in names}
     lines = [
         row("gain", "meaning", "unit", "tuned within", *(f"`{id}`" for id in names)),
@@ -87,6 +86,17 @@ def gains(ids):
         numbers = (f"{values[id][name]:.4g}" for id in names)
         lines.append(row(f"`{name}`", gain.meaning, "; ".join(units), "; ".join(within), *numbers))
     return "\n".join(lines)
+
+
+def chosen(ids):
+    """The tuned gains of laws for the head, a row for each; those of the body are in the files."""
+    names = [id for id in shipped(ids) if id not in ids]
+    if not names:
+        return ""
+    kept = list(declared(type(made(ids[0]))))
+    head = [row("gains", *(f"`{name}`" for name in kept)), "|---|" + "---:|" * len(kept)]
+    rows = [row(f"`{id}`", *(f"{gain:.3g}" for gain in made(id))) for id in names]
+    return "\n".join(head + rows)
 
 
 def made(id):

@@ -44,8 +44,8 @@ class ResidualEnv(gym.Wrapper[Array, Array, Array, Array], gym.utils.RecordConst
     of the largest corrections; the base then acts after the agent, which is shown neither its force
     and moment nor its own last action. Where the head follows a path, also "head": what is added to
     the velocities wanted of it in each axis, and in the plane of its direction, in units of
-    0.03 m/s and 0.1 rad/s; and "joints": rates of the joints over their limit in place of the
-    base's. There "head" is the default.
+    0.03 m/s and 0.1 rad/s; and "joints": rates of the joints in place of the base's, in units of
+    a fifth of their limit. There "head" is the default.
 
     ## Observation
 

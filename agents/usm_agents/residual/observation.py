@@ -14,6 +14,8 @@ from usm_gym.support.validation import require
 # Scale of a position error, m, or where positions are measured worse than in `field`, so many of
 # their standard deviations.
 SHORT, DEVIATIONS = 2e-3, 5.0
+# That over so many times as much, by which an agent sees errors that moves the joints alone.
+FAR = 10.0
 
 # How the agent sees the numbers of the base's state that its law declares as `shown`, one per axis.
 BASE_ENTRIES = {

@@ -17,7 +17,7 @@ from usm_baselines.head import HeadLaw, HeadPercept, station_of
 from usm_baselines.policy import Percept, ScriptedPolicy, corrected
 from usm_baselines.signals import model_of, softness_of
 
-from usm_agents.residual.observation import DEVIATIONS, SHORT
+from usm_agents.residual.observation import DEVIATIONS, FAR, SHORT
 from usm_agents.residual.observer import ResidualObserver
 from usm_gym.kernels.compile import compiled
 from usm_gym.manipulator import Manipulator
@@ -40,6 +40,8 @@ RESIDUAL_SCALE = 20.0
 LARGEST_CORRECTION, LEAST_DEVIATION = (10.0, 80.0, 400.0), 5e-5
 # The largest corrections of the velocities wanted of the head, m/s, and of its direction, rad/s.
 LARGEST_VELOCITY, LARGEST_TURN = 0.03, 0.1
+# The largest rate of a joint that an agent moves alone, over its limit: many joints share a motion.
+LARGEST_RATE = 0.2
 # N and N m: the limit of the strongest thruster that conditions allow.
 LEAST_RESIDUAL, LARGEST_RESIDUAL = 1e-6, 1000.0
 MOST_FRAMES = 100
@@ -171,6 +173,8 @@ class Residual:
         self._estimator = Estimator(station)
         noise = nominal.position_noise if position_noise is None else position_noise
         length = max(SHORT, DEVIATIONS * noise)
+        if action == "joints":  # at first the head is far from where it should be
+            length *= FAR
         self._observer = ResidualObserver(
             base,
             nominal.robot,
@@ -288,7 +292,7 @@ class Residual:
         if self._action == "head":
             return law.decide(known, self._velocities * action)  # type: ignore[no-any-return]
         command, base_state = law.decide(known)
-        command[:, -self.actions :] = action
+        command[:, -self.actions :] = LARGEST_RATE * action
         return command, base_state
 
     def _correction(self, action: Array) -> NDArray[np.float64]:
