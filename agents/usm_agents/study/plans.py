@@ -69,7 +69,7 @@ _HEAD = Plan(
     steps=500_000,
 )
 _HEAD_IN_SPACE = replace(
-    _HEAD, env="usm_agents:USM-Head3DResidual-v0", base="rates-lqg-joints-eely", conditions=SPACE
+    _HEAD, env="usm_agents:USM-Head3DResidual-v0", base="whole-lqg-joints-eely", conditions=SPACE
 )
 
 # The agents that are shipped, each as its seed 0. One whose base is another agent comes after it.
