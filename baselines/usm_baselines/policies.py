@@ -208,7 +208,7 @@ HEAD_LAWS: dict[str, tuple[type[HeadLaw], str, tuple[str, ...]]] = {
     "rates": (
         ResolvedRates,
         "resolved rates for the head",
-        ("sta", "pd", "lqg-joints", "adaptive", "oracle"),
+        ("sta", "pd", "lqg-joints", "adaptive", "informed", "oracle"),
     ),
     "priority": (TaskPriority, "task priority for the head", ("lqg-joints",)),
     "whole": (
