@@ -16,6 +16,7 @@ SHORT = {
     "in_space": {"PICTURE": 1.0, "EPISODES": 2},
     "own_controller": {"BANDWIDTHS": (6.0, 10.0), "SAMPLED": 2, "EPISODES": 2},
     "train_residual": {"STEPS": 1, "EPISODES": 2},
+    "write_under_water": {"EPISODES": 2},
 }
 
 

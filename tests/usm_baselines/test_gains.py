@@ -73,8 +73,8 @@ def test_every_law_was_tuned_as_long_as_every_other_and_for_the_same(tier) -> No
 # Laws for conditions in which positions are late or rare, or the robot is unknown.
 BEYOND_FIELD = {"sta-navigator", "pd-navigator", "pid-navigator", "smc-navigator"}
 BEYOND_FIELD |= {"adaptive", "informed", "mpc-limits"}
-BEYOND_FIELD |= {"rates-adaptive", "rates-informed", "rates-oracle", "whole-adaptive"}
-BEYOND_FIELD |= {"whole-informed"}
+BEYOND_FIELD |= {f"{law}-{body}" for law in ("rates", "whole") for body in ("adaptive", "informed")}
+BEYOND_FIELD |= {"rates-oracle"}
 
 
 def test_every_law_has_shipped_gains() -> None:
