@@ -97,7 +97,6 @@ AGENTS: dict[str, Plan] = {
     "residual-head-sta": replace(_HEAD, base="rates-sta-tuned"),
     "rl-joints": replace(_HEAD, action="joints", steps=2_000_000, interval=200_000),
     "residual-head-eely": _HEAD_IN_SPACE,
-    "residual-head-sta-eely": replace(_HEAD_IN_SPACE, base="rates-sta-eely"),
 }
 
 
@@ -138,7 +137,6 @@ HEADLINES = (
     "residual-sta-navigator-basin",
     "residual-eely",
     "residual-head",
-    "residual-head-eely",
 )
 FEWER = {
     "estimator-lqg-joints-sea": 3,
@@ -149,7 +147,7 @@ FEWER = {
     "residual-torpedo-eely": 3,
     "estimator-torpedo-eely": 3,
     # It shows how far learning comes without a law for the head.
-    "rl-joints": 3,
+    "rl-joints": 1,
 }
 SEEDS = dict.fromkeys(PLANS, 5) | dict.fromkeys(HEADLINES, 10) | FEWER
 
