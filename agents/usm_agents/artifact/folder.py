@@ -26,7 +26,8 @@ from usm_baselines.registry import POSITION_ONLY, entry, make, register
 from usm_baselines.tiers import TIERS, tier_of
 
 from usm_agents.artifact.network import Activation, Network, Output, Recurrence
-from usm_agents.residual.task import ActionKind, Frames, Residual, ResidualPolicy, ResidualScale
+from usm_agents.residual.action import ActionKind, Frames, ResidualScale
+from usm_agents.residual.task import Residual, ResidualPolicy
 from usm_gym.manipulator import Manipulator, bare
 from usm_gym.spatial_robot import SpatialRobot
 from usm_gym.support.files import read_bytes, read_json, sync_folder, write_bytes, write_json

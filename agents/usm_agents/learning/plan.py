@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, Strict, TypeAdapter
 
 from usm_agents.learning.learner import algorithms
-from usm_agents.residual.task import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
+from usm_agents.residual.action import RESIDUAL_SCALE, ActionKind, Frames, ResidualScale
 from usm_gym.support.files import read_bytes, write_json
 from usm_gym.support.validation import Count, UsageError, in_one_line, require, validated
 from usm_gym.task.conditions import FIELD, IN_SPACE, Conditions, preset_of

@@ -3,51 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
 from usm_baselines.contender import contender
 from usm_baselines.estimation.estimator import Estimate, Estimator, foreseen
 from usm_baselines.estimation.foresight import NAMES
 from usm_baselines.estimation.prediction import believed
-from usm_baselines.head import HeadLaw, HeadPercept, station_of
+from usm_baselines.head import HeadPercept
 from usm_baselines.policy import Percept, ScriptedPolicy, corrected
 from usm_baselines.signals import model_of, softness_of
 
+from usm_agents.residual.action import (
+    LARGEST_CORRECTION,
+    LARGEST_RATE,
+    LARGEST_TURN,
+    LARGEST_VELOCITY,
+    LEAST_DEVIATION,
+    RESIDUAL_SCALE,
+    ActionKind,
+    body_of,
+    check_arguments,
+    deciding_of,
+    numbers_of,
+    usual_action,
+    usual_base,
+)
 from usm_agents.residual.observation import DEVIATIONS, FAR, SHORT
 from usm_agents.residual.observer import ResidualObserver
 from usm_gym.kernels.compile import compiled
-from usm_gym.manipulator import Manipulator
 from usm_gym.plant.thrusters import allocate
 from usm_gym.policy import Policy
-from usm_gym.support.validation import Count, Number, is_whole, require
+from usm_gym.support.validation import require
 from usm_gym.task.nominal import Nominal
 from usm_gym.world import world_of
 
 Array = NDArray[np.float32]
 Flags = NDArray[np.bool_]
-
-ActionKind = Literal["force", "wrench", "thrusters", "estimates", "head", "joints"]
-# With these the base acts after the agent.
-BEFORE_BASE = ("estimates", "head", "joints")
-# The limit of a thruster: less slows learning down, more buys error with chattering.
-RESIDUAL_SCALE = 20.0
-# The largest corrections of error, rate and disturbance over the standard deviation of a measured
-# position (1, 1/s, 1/s^2), which is taken to be no less than so many metres.
-LARGEST_CORRECTION, LEAST_DEVIATION = (10.0, 80.0, 400.0), 5e-5
-# The largest corrections of the velocities wanted of the head, m/s, and of its direction, rad/s.
-LARGEST_VELOCITY, LARGEST_TURN = 0.03, 0.1
-# The largest rate of a joint that an agent moves alone, over its limit: many joints share a motion.
-LARGEST_RATE = 0.2
-# N and N m: the limit of the strongest thruster that conditions allow.
-LEAST_RESIDUAL, LARGEST_RESIDUAL = 1e-6, 1000.0
-MOST_FRAMES = 100
-
-ResidualScale = Annotated[Number, Field(ge=LEAST_RESIDUAL, le=LARGEST_RESIDUAL)]
-Frames = Annotated[Count, Field(le=MOST_FRAMES)]
 
 
 class Memory(NamedTuple):
@@ -138,39 +132,23 @@ class Residual:
         Raises:
             ValueError: If the base is unknown or an argument not allowed.
         """
-        world, steered = world_of(nominal.robot), isinstance(nominal.robot, Manipulator)
-        if base is None:
-            base = "rates-sta" if steered else "sta"
-        if action is None:
-            action = "head" if steered else "force"
-        _check(residual_scale, action, frames)
-        self.nominal = nominal
-        self.base = base = _made(base, nominal)
+        action = action or usual_action(nominal)
+        check_arguments(residual_scale, action, frames)
+        self.nominal, body = nominal, body_of(nominal)
+        self.base = base = _made(usual_base(nominal) if base is None else base, nominal)
         self._scale, self._action = float(residual_scale), action
-        # What is estimated is the body, whoever moves the joints.
-        station = station_of(nominal) if steered else nominal
-        held = world_of(station.robot)
-        plain = held.layout
+        plain = world_of(body.robot).layout
         self._body_size = plain.size
-        self._softness = softness_of(model_of(station))
+        self._softness = softness_of(model_of(body))
         self._limit = plain.slices["thruster_limit"].start
         self._limit_scale = plain.scale[self._limit]
-        self._deciding = _deciding(base, action)
+        self._deciding = deciding_of(base, action)
         # A base whose estimates another agent corrects: this one is shown what that base believes.
         self._believing: Residual | None = None
         if isinstance(base, ResidualPolicy) and base.residual.corrects:
             self._believing = base.residual
-        axes = len(world.axes)
-        numbers = {
-            "force": axes,
-            "wrench": axes + len(held.attitude),
-            "thrusters": world.thrusters,
-            "estimates": len(NAMES) * axes,
-            "head": axes + len(world.attitude),
-            "joints": world.actions - world.thrusters,
-        }
-        self.actions = numbers[action]
-        self._estimator = Estimator(station)
+        self.actions = numbers_of(nominal, action)
+        self._estimator = Estimator(body)
         noise = nominal.position_noise if position_noise is None else position_noise
         length = max(SHORT, DEVIATIONS * noise)
         if action == "joints":  # at first the head is far from where it should be
@@ -186,8 +164,8 @@ class Residual:
         )
         self.layout = self._observer.layout
         self.correction = max(noise, LEAST_DEVIATION) * np.array(LARGEST_CORRECTION)
-        turns = self.actions - axes if action == "head" else 0
-        self._velocities = np.array([LARGEST_VELOCITY] * axes + [LARGEST_TURN] * turns)
+        axes = len(world_of(nominal.robot).axes)
+        self._velocities = np.where(np.arange(self.actions) < axes, LARGEST_VELOCITY, LARGEST_TURN)
 
     @property
     def corrects(self) -> bool:
@@ -352,34 +330,6 @@ class ResidualPolicy:
         require(action.shape == fitting, "the agent's action", action.shape, f"shape {fitting}")
         command, memory = self.residual.command(memory, action)
         return (command if plain.ndim == 2 else command[0]), (memory, agent_state)
-
-
-def _check(residual_scale: float, action: str, frames: int) -> None:
-    """Refuse arguments of a residual task that are not allowed."""
-    kinds = get_args(ActionKind)
-    require(action in kinds, "action", action, " or ".join(kinds))
-    require(
-        isinstance(residual_scale, (int, float))
-        and LEAST_RESIDUAL <= residual_scale <= LARGEST_RESIDUAL,
-        "residual_scale",
-        residual_scale,
-        f"{LEAST_RESIDUAL:g} to {LARGEST_RESIDUAL:g} N",
-    )
-    require(is_whole(frames, 1, MOST_FRAMES), "frames", frames, f"1 to {MOST_FRAMES}")
-
-
-def _deciding(base: Policy, action: str) -> ScriptedPolicy | HeadLaw | None:
-    """The base, if it acts after the agent."""
-    if action not in BEFORE_BASE:
-        return None
-    if action == "estimates":
-        estimating = isinstance(base, ScriptedPolicy) and base.predictor is not None
-        require(estimating, "base", base, "a law that estimates by the plant, to be corrected")
-        assert isinstance(base, ScriptedPolicy)
-        return base
-    require(isinstance(base, HeadLaw), "base", base, "a law for the head, which moves the joints")
-    assert isinstance(base, HeadLaw)
-    return base
 
 
 def _made(base: str | Policy, nominal: Nominal) -> Policy:
