@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import usm_baselines
+from usm_baselines.benchmark.leaderboard import LeaderboardResult
 
 import usm_gym
 from usm_gym.evaluation import rollout
@@ -161,11 +162,40 @@ def _extremes(x: np.ndarray, y: np.ndarray) -> Sequence[tuple[float, float]]:
     return [(x[k], y[k]) for k in kept]
 
 
+# Who holds the body while the same law moves the head, and in which colour they are drawn.
+HOLDERS = {"sta": "error", "lqg-joints": "quiet", "oracle": "head-edge"}
+# Boards of the head, and where their bars begin; the longest bar.
+PANELS, LONGEST = {"head": ("in the plane", 56.0), "head3d": ("in space", 196.0)}, 350.0
+
+
+def held_by() -> str:
+    """Draw the error of the head by who holds the body, from the published leaderboards."""
+    marks = []
+    for board, (title, top) in PANELS.items():
+        path = Path(__file__).parents[1] / "results" / usm_gym.__version__ / board
+        rows = LeaderboardResult.read(path / "leaderboard.json").main
+        errors = {name: 1e3 * rows[f"rates-{name}"].combined[0] for name in HOLDERS}
+        axes = " + ".join(rows["rates-sta"].axes)
+        marks.append(text(f"{title}, {axes}", (32, top), (0, -14), "small", "quiet"))
+        for k, (name, colour) in enumerate(HOLDERS.items()):
+            end, height = 166 + LONGEST * errors[name] / max(errors.values()), top + 12 + 30 * k
+            marks.append(text(f"held by {name}", (32, height), (0, 5), "small"))
+            marks.append(line(colour, [(166, height), (end, height)], 14.0, cap="butt"))
+            marks.append(text(f"{errors[name]:.3g} mm", (end, height), (8, 5), "small"))
+    description = (
+        "Bars: the largest error of the head over the suites head and head3d, with resolved rates "
+        "over the paper's law, over a law that foresees the joints, and over the oracle. In the "
+        "plane the oracle leaves a third of the error, in space nearly all of it."
+    )
+    return document((640, 310), "How much of the head's error is the body's", description, marks)
+
+
 DRAWINGS = {
     "robot.svg": lambda: robot_drawing(Robot()),
     "eely.svg": lambda: spatial_robot_drawing(EELY),
     "control_loop.svg": control_loop,
     "joint_motion.svg": joint_motion,
+    "held_by.svg": held_by,
 }
 
 

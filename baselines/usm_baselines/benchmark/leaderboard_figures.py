@@ -196,9 +196,16 @@ def _errors(rows: Mapping[str, Standing]) -> Any:
 
 def _plain(panel: Any) -> None:
     """Draw no more lines than a reader needs, and numbers as they are spoken."""
+    from matplotlib.ticker import LogFormatterSciNotation
+
+    class Spoken(LogFormatterSciNotation):
+        def __call__(self, value: float, place: Any = None) -> str:
+            return f"{value:g}" if super().__call__(value, place) else ""
+
     panel.grid(alpha=0.25, linewidth=0.5)
     for side in ("top", "right"):
         panel.spines[side].set_visible(False)
     for axis in (panel.xaxis, panel.yaxis):
         if axis.get_scale() == "log":
             axis.set_major_formatter(lambda value, place: f"{value:g}")
+            axis.set_minor_formatter(Spoken())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import islice
 
 from usm_baselines.benchmark.results import CompetitorScores, is_informed
 from usm_baselines.families import Family
@@ -50,9 +51,8 @@ def choices(rows: Mapping[str, CompetitorScores]) -> dict[str, list[str]]:
             if row.competitor and fits(id, row):
                 found.setdefault(id, []).append(reason)
                 break
-    for id, row in rows.items():
-        if not row.competitor and is_informed(id):
-            found[id] = [TOLD_ALL]
+    told = (id for id, row in rows.items() if not row.competitor and is_informed(id))
+    found |= {id: [TOLD_ALL] for id in islice(told, 1)}
     return {id: found[id] for id in rows if id in found}
 
 
@@ -82,5 +82,5 @@ def is_learned(id: str) -> bool:
 def is_papers(id: str) -> bool:
     """Whether a policy is the paper's law, or one over it, with any gains, lag and estimates."""
     law = base_of(id)
-    steers = law in ids() and entry(law).moves_joints
+    steers = law in ids() and entry(law).family is Family.HEAD
     return law == LAW or (steers and law.endswith(f"-{LAW}"))
