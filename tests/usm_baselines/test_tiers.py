@@ -75,10 +75,14 @@ def test_all_other_conditions_are_for_all_but_policies_of_tiers(conditions: Cond
 
 @pytest.mark.parametrize("mode", ["head", "head3d"])
 @pytest.mark.parametrize("conditions", ["field", "basin"])
-def test_laws_for_the_head_meet_all_conditions_of_the_head_and_no_others(mode, conditions) -> None:
+def test_laws_for_the_head_are_meant_for_it_alone_with_gains_that_fit(mode, conditions) -> None:
     preset = presets_of(mode)[conditions]
     laws = {id for id in registry.ids() if registry.entry(id).moves_joints}
-    assert set(meant_for(preset, mode)) == laws
-    assert {"rates-sta", "whole-lqg-joints"} <= set(short_list(preset, mode)) < laws
+    meant = set(meant_for(preset, mode))
+    fitting = ("", tier_of(preset, mode))
+    assert meant == {id for id in laws if registry.entry(id).tuned_for in fitting}
+    gains = {"field": ("tuned", "eely"), "basin": ("basin", "eely-basin")}[conditions]
+    assert f"rates-sta-{gains[mode == 'head3d']}" in meant
+    assert {"rates-sta", "whole-lqg-joints"} <= set(short_list(preset, mode)) < meant
     for other in ("operation", "operation3d"):
         assert not laws & set(meant_for(presets_of(other)[conditions], other))  # type: ignore[arg-type]
