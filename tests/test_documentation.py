@@ -32,6 +32,7 @@ PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 BUDGETS = {
     "usm policies": "",
     "usm evaluate --suite": "--policies zero",
+    "usm evaluate --mode head": "--episodes 2",
     "usm evaluate": "--mode operation --episodes 2",
     "usm compare": "--mode operation --episodes 2",
     "usm robustness --vary delay": "--values 1 --episodes 2",

@@ -54,7 +54,8 @@ def test_a_tier_brings_its_suite_and_its_policies(chosen, capsys, monkeypatch):
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_tables_of_scans_are_readable(width, chosen, monkeypatch, capsys):
-    longest = max((id for id in usm_baselines.ids() if "basin" in id), key=len)
+    of_body = (id for id in usm_baselines.ids() if not registry.entry(id).moves_joints)
+    longest = max((id for id in of_body if "basin" in id), key=len)
     monkeypatch.setenv("COLUMNS", str(width))
     chosen("--suite", "operation-basin", "--policies", f"{longest},pd-navigator-basin")
     said = capsys.readouterr().out
