@@ -85,7 +85,10 @@ def test_the_closed_loop_converges_in_second_order(id, gains, noise, filtered):
 OF_BODY = [id for id in ids() if not (entry(id).privileged or entry(id).moves_joints)]
 COMPETITORS = [id for id in OF_BODY if entry(id).tuned_for not in TIERS and "navigator" not in id]
 IN_SPACE = [id for id in OF_BODY if id in PAPER or id.endswith("-eely")]
-OF_HEAD = ("rates-sta", "priority-lqg-joints", "whole-lqg-joints")
+OF_HEAD = {
+    "head": ("rates-sta-tuned", "priority-lqg-joints-tuned", "residual-head"),
+    "head3d": ("rates-sta-eely", "priority-lqg-joints-eely", "whole-lqg-joints-eely"),
+}
 
 
 @pytest.mark.slow
@@ -97,7 +100,7 @@ OF_HEAD = ("rates-sta", "priority-lqg-joints", "whole-lqg-joints")
         ("operation-basin", "lqg-joints"),
         *(("operation3d", id) for id in IN_SPACE if "torpedo" not in id),
         *(("torpedo3d", id) for id in IN_SPACE if "torpedo" in id),
-        *((head, id) for head in ("head", "head3d") for id in OF_HEAD),
+        *((head, id) for head, laws in OF_HEAD.items() for id in laws),
     ],
 )
 def test_the_default_step_changes_no_score(suite_name, id):
