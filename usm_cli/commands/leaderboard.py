@@ -28,7 +28,7 @@ from usm_gym.suites import NAMES
 from usm_gym.support.files import check_writable, holding, read_text, write_text
 from usm_gym.support.results import Provenance
 from usm_gym.support.validation import require
-from usm_gym.task.modes import of_head
+from usm_gym.task.modes import in_space, of_head
 
 DESCRIPTION = """\
 Score every policy on the frozen suites that it is meant for, and laws for the body on the operation
@@ -113,7 +113,8 @@ def run(arguments: argparse.Namespace) -> None:
 
 def board_of(head: bool, space: bool) -> Board:
     """The board of body or head, in the plane or in space."""
-    return BOARDS[2 * head + space]
+    kinds = {(of_head(board.main), in_space(board.main)): board for board in BOARDS}
+    return kinds[head, space]
 
 
 def decision_times(folder: Path, board: Board = PLANE) -> dict[str, float]:

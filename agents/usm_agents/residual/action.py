@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 from usm_baselines.estimation.foresight import NAMES
-from usm_baselines.head import HeadLaw, station_of
+from usm_baselines.head import HeadLaw
 from usm_baselines.policy import ScriptedPolicy
 
-from usm_gym.manipulator import Manipulator
+from usm_gym.manipulator import Manipulator, bare
 from usm_gym.policy import Policy
 from usm_gym.support.validation import Count, Number, is_whole, require
 from usm_gym.task.nominal import Nominal
@@ -47,7 +48,7 @@ def usual_action(nominal: Nominal) -> ActionKind:
 
 def body_of(nominal: Nominal) -> Nominal:
     """What is known of the robot as one that holds its station, whoever moves the joints."""
-    return station_of(nominal) if isinstance(nominal.robot, Manipulator) else nominal
+    return replace(nominal, robot=bare(nominal.robot))
 
 
 def numbers_of(nominal: Nominal, action: ActionKind) -> int:

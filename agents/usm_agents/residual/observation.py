@@ -14,7 +14,7 @@ from usm_gym.support.validation import require
 # Scale of a position error, m, or where positions are measured worse than in `field`, so many of
 # their standard deviations.
 SHORT, DEVIATIONS = 2e-3, 5.0
-# That over so many times as much, by which an agent sees errors that moves the joints alone.
+# An agent that moves the joints alone is shown errors over so many times that scale.
 FAR = 10.0
 
 # How the agent sees the numbers of the base's state that its law declares as `shown`, one per axis.
@@ -52,8 +52,7 @@ SPATIAL_POSTURE = (
     Entry("bending_joints", 1, "1", 10.0, 100.0, "how many joints are asked to bend"),
 )
 
-# Of a robot whose head follows a path, behind its posture: of the axes, of the channels, which in
-# the plane are also the direction, and of the joints.
+# What follows the posture of a robot whose head follows a path. Sizes are those of axes and joints.
 HEAD_ERROR = Entry("head_error", 1, "m", SHORT, 10 * SHORT, "error of the head, by the navigator")
 HEAD_ENTRIES = (
     Entry("head_reference_velocity", 1, "m/s", 0.1, 1.0, "velocity of the head's reference"),
