@@ -35,6 +35,7 @@ BUDGETS = {
     "usm evaluate --mode head": "--episodes 2",
     "usm evaluate": "--mode operation --episodes 2",
     "usm compare": "--mode operation --episodes 2",
+    "usm robustness --mode head": "--episodes 2",
     "usm robustness --vary delay": "--values 1 --episodes 2",
     "usm robustness --vary step": "--values 0.5 --episodes 2",
     "usm robustness": "--values 0.05 --episodes 2",

@@ -113,8 +113,8 @@ def table(result: RobustnessResult) -> Table:
     rows = empty_table(
         "policy",
         *(f"{value:g}" for value in result.values),
-        title=f"largest position error after settling, mm, {axes}, then that of the heading, and "
-        f"lost robots, against {result.label}",
+        title=f"largest position error after settling, mm, {axes}, then those of angles, and lost "
+        f"robots, against {result.label}",
     )
     for name, points in result.results.items():
         rows.add_row(name, *map(cell, points))
